@@ -1,9 +1,8 @@
 #pragma once
 
-#include <lumihull/base/error.h>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <lumihull/base/error.h>
 
 #include <filesystem>
 #include <functional>
@@ -34,7 +33,7 @@ Error expect_error(const std::function<void()>& body);
 }  // namespace lumihull::test
 
 /// At the top of a test that needs real photographs.
-#define LUMIHULL_NEED_REAL_DATA(variable, folder)                                                             \
-  const std::filesystem::path variable = lumihull::test::real_data() / folder;                                \
-  if (lumihull::test::real_data().empty() || !std::filesystem::exists(variable))                              \
+#define LUMIHULL_NEED_REAL_DATA(variable, folder)                                \
+  const std::filesystem::path variable = lumihull::test::real_data() / folder;   \
+  if (lumihull::test::real_data().empty() || !std::filesystem::exists(variable)) \
   GTEST_SKIP() << "needs the real photographs '" << folder << "': set LUMIHULL_TEST_DATA to their folder"

@@ -4,7 +4,6 @@
 #include <lumihull/base/pose.h>
 
 #include <Eigen/Core>
-
 #include <optional>
 
 namespace lumihull {

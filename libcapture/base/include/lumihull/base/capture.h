@@ -31,20 +31,20 @@ struct FileStamp {
 
 /// One shot of one camera.
 struct Shot {
-  std::string name;                     ///< unique in the capture; masks and renderings are named after it
-  std::string file;                     ///< the photograph: relative to the capture's folder, or absolute (a reference)
+  std::string name;  ///< unique in the capture; masks and renderings are named after it
+  std::string file;  ///< the photograph: relative to the capture's folder, or absolute (a reference)
   FileStamp stamp;
-  int camera = 0;                       ///< index into Capture::cameras
-  int orientation = 1;                  ///< EXIF; only for showing pictures to people
-  std::optional<Pose> cam_from_world;   ///< nullopt: not positioned
-  std::string time;                     ///< ISO 8601, from EXIF, or empty
+  int camera = 0;                      ///< index into Capture::cameras
+  int orientation = 1;                 ///< EXIF; only for showing pictures to people
+  std::optional<Pose> cam_from_world;  ///< nullopt: not positioned
+  std::string time;                    ///< ISO 8601, from EXIF, or empty
   MaskSource mask_source = MaskSource::none;
-  std::string mask_sha256;              ///< of the mask file as Lumihull wrote or imported it
+  std::string mask_sha256;  ///< of the mask file as Lumihull wrote or imported it
 };
 
 /// What a stage left behind when it last ended.
 struct StageRecord {
-  std::string digest;            ///< of all its inputs and options
+  std::string digest;  ///< of all its inputs and options
   double seconds = 0;
   std::uint64_t peak_bytes = 0;  ///< high-water mark of the process while it ran
   std::string finished;          ///< ISO 8601, UTC
@@ -74,11 +74,11 @@ class LUMIHULL_API Capture {
   Unit unit = Unit::unknown;
   std::vector<Camera> cameras;
   std::vector<Shot> shots;
-  std::vector<Shot> enclosure;                  ///< photographs of the empty enclosure (name, file and stamp are used)
-  std::map<std::string, Options, std::less<>> options;       ///< by stage: "key", "hull", "evaluate", …
+  std::vector<Shot> enclosure;  ///< photographs of the empty enclosure (name, file and stamp are used)
+  std::map<std::string, Options, std::less<>> options;  ///< by stage: "key", "hull", "evaluate", …
   std::map<std::string, StageRecord, std::less<>> stages;
   std::optional<std::array<std::uint8_t, 3>> background_rgb;  ///< what pictures are composited on when judged
-  std::vector<std::string> notes;               ///< what importers had to say, e.g. "the world was mirrored"
+  std::vector<std::string> notes;  ///< what importers had to say, e.g. "the world was mirrored"
 
   /// Every Nth shot (the first, the N+1st, …) is held out of training, hull and appearance; 0: none.
   int hold_out() const;
@@ -97,7 +97,8 @@ class LUMIHULL_API Capture {
   Image read_photo(std::size_t shot, int channels = 3) const;
   /// Reads a shot's mask as 8-bit, 1 channel, of the photograph's size; not_found where there is none.
   Image read_mask(std::size_t shot) const;
-  /// Writes a mask (8-bit, 1 channel, the photograph's size) and stores its digest in the shot.
+  /// Writes a mask (8-bit, 1 channel, the photograph's size) and stores its digest in the shot. Different threads may
+  /// write masks of different shots at once.
   void write_mask(std::size_t shot, const Image& mask, MaskSource source);
   /// none, keyed, imported, or edited where the file is not what was written.
   MaskSource mask_state(const Shot& shot) const;
@@ -113,6 +114,7 @@ class LUMIHULL_API Capture {
 
  private:
   explicit Capture(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  void absorb_mask_journal();
   std::filesystem::path folder_;
 };
 

@@ -17,8 +17,8 @@ enum class ErrorCode : std::int32_t {
   unsupported = 5,       ///< valid, but this build or version can't do it
   degenerate = 6,        ///< the data are valid, but their geometry has no (unique) answer
   out_of_memory = 7,
-  cancelled = 8,         ///< `Job::cancel` was called
-  internal = 9,          ///< a defect of Lumihull
+  cancelled = 8,  ///< `Job::cancel` was called
+  internal = 9,   ///< a defect of Lumihull
 };
 
 /// The one exception type of Lumihull.

@@ -33,6 +33,8 @@ class LUMIHULL_API Image {
   Image() = default;
   /// Pixels are zero. Throws Error{invalid_argument} for sizes that are not positive or beyond the limits above.
   Image(int width, int height, int channels, PixelType type = PixelType::u8);
+  /// The same without clearing the pixels, for callers that write every one of them.
+  static Image uninitialized(int width, int height, int channels, PixelType type = PixelType::u8);
   Image(const Image& other);
   Image& operator=(const Image& other);
   Image(Image&&) noexcept;

@@ -1,0 +1,241 @@
+#include "capture_json.h"
+
+#include <lumihull/internal/json.h>
+
+#include <set>
+#include <utility>
+
+namespace lumihull::internal {
+
+namespace {
+
+constexpr std::size_t kMaxShots = 100'000;
+constexpr std::size_t kMaxCameras = 100'000;
+constexpr const char* kMaskSources[] = {"none", "keyed", "imported", "edited"};
+
+std::string read_name(const JsonReader& json) {
+  std::string name = json.string(200);
+  if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos)
+    json.fail("a name without '/', not empty");
+  return name;
+}
+
+std::string read_digest(const JsonReader& json) {
+  std::string digest = json.string(64);
+  if (!digest.empty() && (digest.size() != 64 || digest.find_first_not_of("0123456789abcdef") != std::string::npos))
+    json.fail("a SHA-256 of 64 hexadecimal digits");
+  return digest;
+}
+
+Shot read_shot(const JsonReader& json) {
+  Shot shot;
+  shot.name = read_name(json.at("name"));
+  shot.file = json.at("file").string();
+  if (shot.file.empty()) json.at("file").fail("a file name");
+  if (json.has("sha256")) shot.stamp.sha256 = read_digest(json.at("sha256"));
+  if (json.has("size")) shot.stamp.size = std::uint64_t(json.at("size").integer(0, INT64_MAX));
+  if (json.has("mtime_ns")) shot.stamp.mtime_ns = json.at("mtime_ns").integer(INT64_MIN, INT64_MAX);
+  if (json.has("camera")) shot.camera = int(json.at("camera").integer(0, kMaxCameras));
+  if (json.has("orientation")) shot.orientation = int(json.at("orientation").integer(1, 8));
+  if (json.has("time")) shot.time = json.at("time").string(40);
+  if (json.has("mask")) {
+    const JsonReader mask = json.at("mask");
+    const std::string source = mask.at("source").string();
+    int i = 0;
+    while (i < 4 && source != kMaskSources[i]) ++i;
+    if (i == 4) mask.at("source").fail("\"none\", \"keyed\", \"imported\" or \"edited\"");
+    shot.mask_source = MaskSource(i);
+    shot.mask_sha256 = read_digest(mask.at("sha256"));
+  }
+  return shot;
+}
+
+Json print_shot(const Shot& shot, bool in_enclosure) {
+  Json json{{"name", shot.name}, {"file", shot.file}};
+  if (!shot.stamp.sha256.empty()) json["sha256"] = shot.stamp.sha256;
+  if (shot.stamp.size) json["size"] = shot.stamp.size;
+  if (shot.stamp.mtime_ns) json["mtime_ns"] = shot.stamp.mtime_ns;
+  if (in_enclosure) return json;
+  json["camera"] = shot.camera;
+  if (shot.orientation != 1) json["orientation"] = shot.orientation;
+  if (!shot.time.empty()) json["time"] = shot.time;
+  if (shot.mask_source != MaskSource::none)
+    json["mask"] = {{"source", kMaskSources[int(shot.mask_source)]}, {"sha256", shot.mask_sha256}};
+  return json;
+}
+
+std::vector<Shot> read_shots(const JsonReader& json, std::set<std::string>& names) {
+  std::vector<Shot> shots;
+  const std::size_t n = json.array_size(kMaxShots);
+  for (std::size_t i = 0; i < n; ++i) {
+    shots.push_back(read_shot(json.at(i)));
+    if (!names.insert(shots.back().name).second) json.at(i).at("name").fail("a name that no other shot has");
+  }
+  return shots;
+}
+
+OptionValue read_option(const JsonReader& json) {
+  const Json& v = json.value();
+  if (v.is_boolean()) return v.get<bool>();
+  if (v.is_number_integer()) return json.integer(INT64_MIN, INT64_MAX);
+  if (v.is_number()) return json.number();
+  if (v.is_string()) return json.string();
+  if (v.is_array()) {
+    std::vector<double> list;
+    const std::size_t n = json.array_size(4096);
+    for (std::size_t i = 0; i < n; ++i) list.push_back(json.at(i).number());
+    return list;
+  }
+  json.fail("true, false, a number, a string or a list of numbers");
+}
+
+}  // namespace
+
+void parse_capture_json(std::string_view text, const std::string& name, Capture& capture) {
+  const Json document = parse_json(text, name);
+  const JsonReader top(document, name);
+  check_format(top, "lumihull-capture", 1);
+  const std::string unit = top.at("unit").string();
+  if (unit != "m" && unit != "unknown") top.at("unit").fail("\"m\" or \"unknown\"");
+  capture.unit = unit == "m" ? Unit::metres : Unit::unknown;
+  if (top.has("background_rgb")) {
+    const JsonReader rgb = top.at("background_rgb");
+    if (rgb.array_size(3) != 3) rgb.fail("three integers from 0 to 255");
+    capture.background_rgb.emplace();
+    for (std::size_t c = 0; c < 3; ++c) (*capture.background_rgb)[c] = std::uint8_t(rgb.at(c).integer(0, 255));
+  }
+  if (top.has("notes")) {
+    const JsonReader notes = top.at("notes");
+    const std::size_t n = notes.array_size(10'000);
+    for (std::size_t i = 0; i < n; ++i) capture.notes.push_back(notes.at(i).string());
+  }
+  std::set<std::string> names, enclosure_names;
+  capture.shots = read_shots(top.at("shots"), names);
+  if (top.has("enclosure")) capture.enclosure = read_shots(top.at("enclosure"), enclosure_names);
+  if (top.has("options")) {
+    const JsonReader stages = top.at("options");
+    if (!stages.value().is_object()) stages.fail("an object");
+    for (const auto& stage : stages.value().items()) {
+      const JsonReader options = stages.at(stage.key());
+      if (!options.value().is_object()) options.fail("an object");
+      for (const auto& option : options.value().items())
+        capture.options[stage.key()][option.key()] = read_option(options.at(option.key()));
+    }
+    if (capture.options.contains("evaluate") && stages.at("evaluate").has("hold_out"))
+      stages.at("evaluate").at("hold_out").integer(0, kMaxShots);
+  }
+  if (top.has("stages")) {
+    const JsonReader stages = top.at("stages");
+    if (!stages.value().is_object()) stages.fail("an object");
+    for (const auto& item : stages.value().items()) {
+      const JsonReader json = stages.at(item.key());
+      StageRecord& record = capture.stages[item.key()];
+      record.digest = read_digest(json.at("digest"));
+      record.seconds = json.at("seconds").number(0);
+      record.peak_bytes = std::uint64_t(json.at("peak_bytes").integer(0, INT64_MAX));
+      record.finished = json.at("finished").string(40);
+    }
+  }
+}
+
+std::string print_capture_json(const Capture& capture) {
+  Json json{{"format", "lumihull-capture"}, {"version", 1}, {"unit", capture.unit == Unit::metres ? "m" : "unknown"}};
+  if (capture.background_rgb) json["background_rgb"] = *capture.background_rgb;
+  if (!capture.notes.empty()) json["notes"] = capture.notes;
+  Json options = Json::object();
+  for (const auto& [stage, values] : capture.options)
+    for (const auto& [name, value] : values)
+      std::visit([&, &stage = stage, &name = name](const auto& v) { options[stage][name] = v; }, value);
+  if (!options.empty()) json["options"] = std::move(options);
+  Json stages = Json::object();
+  for (const auto& [name, record] : capture.stages)
+    stages[name] = {{"digest", record.digest},
+                    {"seconds", record.seconds},
+                    {"peak_bytes", record.peak_bytes},
+                    {"finished", record.finished}};
+  if (!stages.empty()) json["stages"] = std::move(stages);
+  Json shots = Json::array();
+  for (const Shot& shot : capture.shots) shots.push_back(print_shot(shot, false));
+  json["shots"] = std::move(shots);
+  if (!capture.enclosure.empty()) {
+    Json enclosure = Json::array();
+    for (const Shot& shot : capture.enclosure) enclosure.push_back(print_shot(shot, true));
+    json["enclosure"] = std::move(enclosure);
+  }
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void parse_cameras_json(std::string_view text, const std::string& name, Capture& capture) {
+  const Json document = parse_json(text, name);
+  const JsonReader top(document, name);
+  check_format(top, "lumihull-cameras", 1);
+
+  const JsonReader cameras = top.at("cameras");
+  const std::size_t n = cameras.array_size(kMaxCameras);
+  for (std::size_t i = 0; i < n; ++i) {
+    const JsonReader json = cameras.at(i);
+    Camera c;
+    c.width = int(json.at("width").integer(1, kMaxImageSide));
+    c.height = int(json.at("height").integer(1, kMaxImageSide));
+    c.f = json.at("f").number(1e-9);
+    const std::pair<const char*, double*> fields[] = {{"s", &c.s},   {"skew", &c.skew}, {"u0", &c.u0},
+                                                      {"v0", &c.v0}, {"k1", &c.k1},     {"k2", &c.k2},
+                                                      {"k3", &c.k3}, {"p1", &c.p1},     {"p2", &c.p2}};
+    for (const auto& [field, value] : fields) *value = json.at(field).number();
+    if (!(c.s > 0)) json.at("s").fail("a positive number");
+    capture.cameras.push_back(c);
+  }
+
+  std::map<std::string, Shot*, std::less<>> by_name;
+  for (Shot& shot : capture.shots) {
+    if (std::size_t(shot.camera) >= n)
+      top.at("cameras").fail("a camera " + std::to_string(shot.camera) + ", which shot \"" + shot.name + "\" uses");
+    by_name[shot.name] = &shot;
+  }
+  const JsonReader poses = top.at("cam_from_world");
+  if (!poses.value().is_object()) poses.fail("an object with a pose for each positioned shot");
+  for (const auto& item : poses.value().items()) {
+    const JsonReader json = poses.at(item.key());
+    const auto shot = by_name.find(item.key());
+    if (shot == by_name.end()) json.fail("the name of a shot of capture.json");
+    const JsonReader q = json.at("q"), t = json.at("t");
+    if (q.array_size(4) != 4) q.fail("four numbers w, x, y, z");
+    if (t.array_size(3) != 3) t.fail("three numbers");
+    Pose pose;
+    pose.rotation =
+        Eigen::Quaterniond(q.at(0).number(-2, 2), q.at(1).number(-2, 2), q.at(2).number(-2, 2), q.at(3).number(-2, 2));
+    if (std::abs(pose.rotation.norm() - 1) > 1e-6) q.fail("a quaternion of length 1");
+    // Normalising what is already normalised to rounding would change the last digit at each round trip.
+    if (std::abs(pose.rotation.norm() - 1) > 1e-14) pose.rotation.normalize();
+    for (std::size_t k = 0; k < 3; ++k) pose.translation[Eigen::Index(k)] = t.at(k).number();
+    shot->second->cam_from_world = pose;
+  }
+}
+
+std::string print_cameras_json(const Capture& capture) {
+  Json cameras = Json::array();
+  for (const Camera& c : capture.cameras)
+    cameras.push_back({{"width", c.width},
+                       {"height", c.height},
+                       {"f", c.f},
+                       {"s", c.s},
+                       {"skew", c.skew},
+                       {"u0", c.u0},
+                       {"v0", c.v0},
+                       {"k1", c.k1},
+                       {"k2", c.k2},
+                       {"k3", c.k3},
+                       {"p1", c.p1},
+                       {"p2", c.p2}});
+  Json poses = Json::object();
+  for (const Shot& shot : capture.shots) {
+    if (!shot.cam_from_world) continue;
+    const auto& q = shot.cam_from_world->rotation;
+    const auto& t = shot.cam_from_world->translation;
+    poses[shot.name] = {{"q", {q.w(), q.x(), q.y(), q.z()}}, {"t", {t.x(), t.y(), t.z()}}};
+  }
+  const Json json{{"format", "lumihull-cameras"}, {"version", 1}, {"cameras", cameras}, {"cam_from_world", poses}};
+  return json.dump(1) + "\n";
+}
+
+}  // namespace lumihull::internal

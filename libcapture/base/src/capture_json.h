@@ -1,0 +1,20 @@
+#pragma once
+
+// capture.json and cameras.json as text: parsing and printing apart from the disk, so that both can be fuzzed.
+
+#include <lumihull/base/capture.h>
+
+#include <string>
+#include <string_view>
+
+namespace lumihull::internal {
+
+/// Fills everything but cameras and poses. `name` is used in errors.
+void parse_capture_json(std::string_view text, const std::string& name, Capture& capture);
+std::string print_capture_json(const Capture& capture);
+
+/// Fills cameras and the shots' poses; parse_capture_json must have run before.
+void parse_cameras_json(std::string_view text, const std::string& name, Capture& capture);
+std::string print_cameras_json(const Capture& capture);
+
+}  // namespace lumihull::internal

@@ -1,0 +1,166 @@
+#include <lumihull/base/capture.h>
+#include <lumihull/base/files.h>
+
+#include <fstream>
+
+#include "support.h"
+
+namespace lumihull {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+Capture small_capture(const fs::path& folder) {
+  Capture capture = Capture::create(folder);
+  capture.unit = Unit::metres;
+  capture.cameras.push_back({.width = 8, .height = 6, .f = 10, .u0 = 4, .v0 = 3, .k1 = -0.1});
+  for (int i = 0; i < 3; ++i) {
+    Shot shot;
+    shot.name = "p" + std::to_string(i);
+    shot.file = "photos/" + shot.name + ".png";
+    if (i != 1) shot.cam_from_world = Pose{Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5), {0.1, 1.0 / 3, double(i)}};
+    capture.shots.push_back(shot);
+    fs::create_directories(folder / "photos");
+    write_png(folder / shot.file, Image(8, 6, 3));
+  }
+  capture.background_rgb = {1, 2, 3};
+  capture.options["hull"]["resolution"] = std::int64_t(150);
+  capture.options["hull"]["region"] = std::vector<double>{-1, 2.5};
+  capture.options["key"]["background"] = std::string("auto");
+  capture.stages["key"] = {sha256("x"), 1.5, 1000, "2026-01-02T03:04:05Z"};
+  capture.notes.push_back("a \"note\"");
+  capture.set_hold_out(2);
+  return capture;
+}
+
+TEST(Capture, SaveAndOpenRoundTrip) {
+  const test::TemporaryFolder folder;
+  const Capture a = small_capture(folder / "c");
+  a.save();
+  const Capture b = Capture::open(folder / "c");
+  EXPECT_EQ(b.unit, Unit::metres);
+  ASSERT_EQ(b.shots.size(), 3u);
+  EXPECT_FALSE(b.positioned(1));
+  EXPECT_EQ(b.shots[0].cam_from_world->translation, a.shots[0].cam_from_world->translation);
+  EXPECT_EQ(b.shots[0].cam_from_world->rotation.coeffs(), a.shots[0].cam_from_world->rotation.coeffs());
+  EXPECT_EQ(b.cameras[0].k1, -0.1);
+  EXPECT_EQ(b.background_rgb, a.background_rgb);
+  EXPECT_EQ(b.options, a.options);
+  EXPECT_EQ(b.notes, a.notes);
+  EXPECT_EQ(b.stages.at("key").seconds, 1.5);
+  EXPECT_EQ(b.hold_out(), 2);
+  EXPECT_TRUE(b.held_out(0) && !b.held_out(1) && b.held_out(2));
+  const std::string first = read_file(folder / "c" / "capture.json");
+  b.save();
+  EXPECT_EQ(read_file(folder / "c" / "capture.json"), first);
+}
+
+TEST(Capture, RefusesAFolderInUse) {
+  const test::TemporaryFolder folder;
+  write_file(folder / "mine.txt", "x");
+  EXPECT_EQ(test::expect_error([&] { Capture::create(folder.path()); }).code(), ErrorCode::invalid_argument);
+  EXPECT_EQ(test::expect_error([&] { Capture::open(folder.path()); }).code(), ErrorCode::not_found);
+}
+
+TEST(Capture, WrongFieldsAreNamedByPointer) {
+  const test::TemporaryFolder folder;
+  small_capture(folder / "c").save();
+  const std::string good = read_file(folder / "c" / "capture.json");
+  const std::string cameras = read_file(folder / "c" / "cameras.json");
+  const auto complaint = [&](const std::string& file, std::string text, const std::string& from,
+                             const std::string& to) {
+    const auto at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+    write_file(folder / "c" / file, text);
+    const Error e = test::expect_error([&] { Capture::open(folder / "c"); });
+    write_file(folder / "c" / "capture.json", good);
+    write_file(folder / "c" / "cameras.json", cameras);
+    EXPECT_EQ(e.code(), ErrorCode::bad_input);
+    EXPECT_THAT(e.subject(), HasSubstr(file));
+    return e.message();
+  };
+  EXPECT_THAT(complaint("capture.json", good, "\"unit\": \"m\"", "\"unit\": 3"), HasSubstr("/unit"));
+  EXPECT_THAT(complaint("capture.json", good, "\"version\": 1", "\"version\": 2"), HasSubstr("/version"));
+  EXPECT_THAT(complaint("capture.json", good, "\"name\": \"p1\"", "\"name\": \"p0\""), HasSubstr("/shots/1/name"));
+  EXPECT_THAT(complaint("capture.json", good, "\"name\": \"p1\"", "\"name\": \"../p\""), HasSubstr("/shots/1/name"));
+  EXPECT_THAT(complaint("capture.json", good, "\"camera\": 0", "\"camera\": -1"), HasSubstr("/shots/0/camera"));
+  EXPECT_THAT(complaint("capture.json", good, "\"camera\": 0", "\"camera\": 7"), HasSubstr("/cameras"));
+  EXPECT_THAT(complaint("capture.json", good, "\"seconds\": 1.5", "\"seconds\": -1"), HasSubstr("/stages/key/seconds"));
+  EXPECT_THAT(complaint("capture.json", good, "{", "["), HasSubstr("JSON"));
+  EXPECT_THAT(complaint("cameras.json", cameras, "\"f\": 10.0", "\"f\": -10"), HasSubstr("/cameras/0/f"));
+  EXPECT_THAT(complaint("cameras.json", cameras, "\"f\": 10.0", "\"f\": 1e999"), HasSubstr(""));
+  EXPECT_THAT(complaint("cameras.json", cameras, "0.5,", "0.6,"), HasSubstr("/cam_from_world/p0/q"));
+  EXPECT_THAT(complaint("cameras.json", cameras, "\"p2\": {", "\"p9\": {"), HasSubstr("/cam_from_world/p9"));
+}
+
+TEST(Capture, OptionsOfAnotherTypeAreAnError) {
+  const test::TemporaryFolder folder;
+  const Capture c = small_capture(folder / "c");
+  EXPECT_EQ(c.option("hull", "resolution", std::int64_t(5)), 150);
+  EXPECT_EQ(c.option("hull", "resolution", 5.0), 150.0);
+  EXPECT_EQ(c.option("hull", "other", std::int64_t(5)), 5);
+  EXPECT_THAT(test::expect_error([&] { c.option("hull", "resolution", std::string()); }).message(),
+              HasSubstr("/options/hull/resolution"));
+}
+
+TEST(Capture, PhotographsMustHaveTheirCamerasSize) {
+  const test::TemporaryFolder folder;
+  const Capture c = small_capture(folder / "c");
+  EXPECT_EQ(c.read_photo(0).width(), 8);
+  write_png(folder / "c" / "photos" / "p1.png", Image(6, 8, 3));
+  const Error e = test::expect_error([&] { c.read_photo(1); });
+  EXPECT_THAT(e.message(), HasSubstr("8 x 6"));
+  EXPECT_THAT(e.subject(), HasSubstr("p1.png"));
+  EXPECT_EQ(test::expect_error([&] { c.view(1); }).subject(), "p1");
+}
+
+TEST(Capture, AMaskThatAPersonEditedIsRecognised) {
+  const test::TemporaryFolder folder;
+  Capture c = small_capture(folder / "c");
+  EXPECT_EQ(c.mask_state(c.shots[0]), MaskSource::none);
+  EXPECT_EQ(test::expect_error([&] { c.read_mask(0); }).code(), ErrorCode::not_found);
+  Image mask(8, 6, 1);
+  mask.row<std::uint8_t>(2)[3] = 255;
+  c.write_mask(0, mask, MaskSource::keyed);
+  EXPECT_EQ(c.mask_state(c.shots[0]), MaskSource::keyed);
+  EXPECT_EQ(c.read_mask(0).row<std::uint8_t>(2)[3], 255);
+  mask.row<std::uint8_t>(2)[4] = 255;
+  write_png(c.mask_path(c.shots[0]), mask);
+  EXPECT_EQ(c.mask_state(c.shots[0]), MaskSource::edited);
+  write_png(c.mask_path(c.shots[0]), Image(6, 8, 1));
+  EXPECT_THAT(test::expect_error([&] { c.read_mask(0); }).message(), HasSubstr("8 x 6"));
+}
+
+TEST(Capture, MasksOfAKilledRunAreNotTakenForDrawnOnes) {
+  const test::TemporaryFolder folder;
+  small_capture(folder / "c").save();
+  {
+    Capture killed = Capture::open(folder / "c");
+    killed.write_mask(0, Image(8, 6, 1), MaskSource::keyed);
+  }  // never saved
+  Capture c = Capture::open(folder / "c");
+  EXPECT_EQ(c.mask_state(c.shots[0]), MaskSource::keyed);
+  c.save();
+  EXPECT_EQ(Capture::open(folder / "c").mask_state(c.shots[0]), MaskSource::keyed);
+  Image drawn(8, 6, 1);
+  drawn.row<std::uint8_t>(0)[0] = 255;
+  fs::create_directories(folder / "c" / "masks");
+  write_png(c.mask_path(c.shots[2]), drawn);
+  EXPECT_EQ(Capture::open(folder / "c").mask_state(c.shots[2]), MaskSource::edited);
+}
+
+TEST(Capture, StampsSeeAChangedFile) {
+  const test::TemporaryFolder folder;
+  write_file(folder / "a", "one");
+  const FileStamp first = Capture::stamp(folder / "a");
+  EXPECT_EQ(first.sha256, sha256("one"));
+  EXPECT_EQ(Capture::stamp(folder / "a", first).sha256, first.sha256);
+  write_file(folder / "a", "two!");
+  EXPECT_EQ(Capture::stamp(folder / "a", first).sha256, sha256("two!"));
+  EXPECT_EQ(test::expect_error([&] { Capture::stamp(folder / "b"); }).code(), ErrorCode::not_found);
+}
+
+}  // namespace
+}  // namespace lumihull
