@@ -16,9 +16,7 @@ namespace lumihull {
 enum class PixelType : std::uint8_t { u8, u16, f32 };
 
 /// Bytes of one channel of one pixel.
-constexpr std::size_t size_of(PixelType type) {
-  return type == PixelType::u8 ? 1 : type == PixelType::u16 ? 2 : 4;
-}
+constexpr std::size_t size_of(PixelType type) { return type == PixelType::u8 ? 1 : type == PixelType::u16 ? 2 : 4; }
 
 /// The largest width or height, and the largest number of pixels, that any reader accepts.
 inline constexpr int kMaxImageSide = 65500;
@@ -75,10 +73,10 @@ struct ImageInfo {
   int width = 0, height = 0;  ///< as stored: the sensor's rows and columns, before `orientation`
   int channels = 0;
   PixelType type = PixelType::u8;
-  int orientation = 1;        ///< EXIF 1 … 8; 1 = as stored
+  int orientation = 1;  ///< EXIF 1 … 8; 1 = as stored
   std::optional<double> focal_length_mm;
   std::optional<double> focal_length_35mm_mm;
-  std::string time;           ///< EXIF DateTimeOriginal as "YYYY-MM-DDThh:mm:ss", or empty
+  std::string time;  ///< EXIF DateTimeOriginal as "YYYY-MM-DDThh:mm:ss", or empty
   std::string make, model, lens;
 };
 
