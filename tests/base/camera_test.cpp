@@ -92,7 +92,7 @@ TEST(Camera, RayAndProjectionAreInverse) {
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     SCOPED_TRACE(seed);
     const Camera c = random_camera(seed);
-    for (const Vector2d px :
+    for (const Vector2d& px :
          {Vector2d(0.5, 0.5), Vector2d(3000, 100), Vector2d(1500, 1024), Vector2d(3071.5, 2047.5)}) {
       const auto ray = c.ray(px);
       if (!ray) continue;  // outside the lens model's domain

@@ -9,6 +9,7 @@ namespace lumihull {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::HasSubstr;
 
 Capture small_capture(const fs::path& folder) {
@@ -86,7 +87,14 @@ TEST(Capture, WrongFieldsAreNamedByPointer) {
   EXPECT_THAT(complaint("capture.json", good, "\"name\": \"p1\"", "\"name\": \"p0\""), HasSubstr("/shots/1/name"));
   EXPECT_THAT(complaint("capture.json", good, "\"name\": \"p1\"", "\"name\": \"../p\""), HasSubstr("/shots/1/name"));
   EXPECT_THAT(complaint("capture.json", good, "\"camera\": 0", "\"camera\": -1"), HasSubstr("/shots/0/camera"));
-  EXPECT_THAT(complaint("capture.json", good, "\"camera\": 0", "\"camera\": 7"), HasSubstr("/cameras"));
+  {  // the complaint is cameras.json's: it lacks what capture.json names
+    std::string text = good;
+    text.replace(text.find("\"camera\": 0"), 11, "\"camera\": 7");
+    write_file(folder / "c" / "capture.json", text);
+    const Error e = test::expect_error([&] { Capture::open(folder / "c"); });
+    write_file(folder / "c" / "capture.json", good);
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("cameras.json"), HasSubstr("/cameras"), HasSubstr("p0")));
+  }
   EXPECT_THAT(complaint("capture.json", good, "\"seconds\": 1.5", "\"seconds\": -1"), HasSubstr("/stages/key/seconds"));
   EXPECT_THAT(complaint("capture.json", good, "{", "["), HasSubstr("JSON"));
   EXPECT_THAT(complaint("cameras.json", cameras, "\"f\": 10.0", "\"f\": -10"), HasSubstr("/cameras/0/f"));

@@ -170,7 +170,8 @@ std::optional<Vector2d> Camera::project(const Vector3d& point, Matrix23d* jacobi
 bool Camera::project_with_parameter_jacobian(const Vector3d& point, Vector2d* pixel, Matrix23d* by_point,
                                              Eigen::Matrix<double, 2, 10>* by_parameters) const {
   if (!(point.z() > 0)) return false;
-  const Vector2d c(point.x() / point.z(), point.y() / point.z());
+  const double inverse_z = 1 / point.z();
+  const Vector2d c(point.x() * inverse_z, point.y() * inverse_z);
   Matrix2d lens;
   const auto d = distort(c, &lens);
   if (!d) return false;

@@ -1,0 +1,11 @@
+// lumihull run CAPTURE: every stage that exists and is needed.
+
+#include "program.h"
+
+namespace lumihull::program {
+
+void add_run(Program& program) {
+  add_stage_verb(program, "run", "all the stages that are needed: key, hull, texture, evaluate, report");
+}
+
+}  // namespace lumihull::program

@@ -1,0 +1,61 @@
+#pragma once
+
+// What the pipeline knows of a stage: one definition a stage, in the file stage_<name>.cpp.
+
+#include <lumihull/base/capture.h>
+#include <lumihull/base/job.h>
+#include <lumihull/slf/pipeline.h>
+
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace lumihull::slf {
+
+/// Collects everything that a stage's result depends on.
+class InputDigest {
+ public:
+  void add(std::string_view field, std::string_view value);
+  /// The file's bytes; a missing file counts as such.
+  void add_file(std::string_view field, const std::filesystem::path& file);
+  std::string hex() const;
+
+ private:
+  std::string text_;
+};
+
+struct StageDefinition {
+  std::string_view name;
+  int version;  ///< goes up when the same inputs give another result
+  std::vector<OptionSpec> options;
+
+  /// Whether `run` should do it at all; where not, `why` is what is said.
+  bool (*needed)(const Capture& capture, std::string& why);
+  /// Adds the inputs besides the options. Photographs' stamps are up to date when it is called.
+  void (*inputs)(const Capture& capture, InputDigest& digest);
+  /// Whether the result of the last time is still there.
+  bool (*present)(const Capture& capture);
+  /// Does it and returns what there is to say.
+  std::vector<std::string> (*run)(Capture& capture, Job& job);
+};
+
+const StageDefinition& key_stage();
+const StageDefinition& hull_stage();
+const StageDefinition& texture_stage();
+const StageDefinition& evaluate_stage();
+const StageDefinition& report_stage();
+
+template <class T>
+T effective(const Capture& capture, std::string_view stage, std::string_view name) {
+  return std::get<T>(effective_option(capture, stage, name));
+}
+
+/// The parts that several stages depend on.
+void add_photos(const Capture& capture, InputDigest& digest);   ///< stamps of all photographs
+void add_cameras(const Capture& capture, InputDigest& digest);  ///< intrinsics, poses, what is held out
+void add_masks(const Capture& capture, InputDigest& digest);    ///< bytes of all masks
+
+std::filesystem::path textured_path(const Capture& capture);
+
+}  // namespace lumihull::slf
