@@ -1,0 +1,55 @@
+#pragma once
+
+#include <lumihull/base/api.h>
+#include <lumihull/base/capture.h>
+#include <lumihull/base/job.h>
+#include <lumihull/calib/color_key.h>
+#include <lumihull/calib/key_image.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace lumihull::hull {
+
+/// How a capture's photographs are keyed.
+struct KeyOptions {
+  /// Where the background's training samples come from:
+  ///   "auto"       photographs of the empty enclosure where the capture has them, else the photographs themselves
+  ///   "enclosure"  photographs of the empty enclosure
+  ///   "photos"     the photographs themselves, with the cameras' help where they are known
+  ///   "regions"    the rectangles named in `regions`
+  ///   a path       a key that was saved before (JSON)
+  std::string background = "auto";
+  std::string regions;                 ///< "NAME:x,y,width,height;…", px; for background = "regions"
+  int k = 7;                           ///< neighbours asked (paper, eq. 9)
+  double foreground_share = 0.2;       ///< uniform foreground samples as a share of the background's
+  std::size_t max_samples = 100'000;   ///< background samples kept of all that were seen
+  std::uint64_t seed = 1;              ///< of the uniform foreground samples
+  calib::EdgeMode edges = calib::EdgeMode::soft;
+  /// Regularised silhouettes: specks and pinholes go, and what training on the photographs themselves learns of the
+  /// object's place and colours is used. Off: the paper's pure decision, pixel by pixel.
+  bool clean = true;
+
+  /// Throws Error{invalid_argument} naming the option.
+  void validate() const;
+};
+
+struct KeyReport {
+  std::string source;                 ///< "enclosure", "photos", "photos and cameras", "regions" or "file"
+  std::size_t keyed = 0;              ///< masks written
+  std::size_t kept = 0;               ///< masks left alone: imported, or edited by a person
+  int rounds = 0;                     ///< train, carve, train again: how often; 0 without cameras
+  std::vector<std::string> warnings;  ///< each names its photograph
+};
+
+/// The stage `key`: trains a colour key, writes a mask for every photograph and key.json to the capture's folder, and
+/// sets the capture's background colour where it has none. Held-out photographs are keyed, but train nothing. The
+/// capture is not saved. Masks are the same for any number of threads.
+/// Errors: invalid_argument (options), not_found, bad_input (a photograph, a key), degenerate (no background found;
+/// every mask is empty or full), cancelled. Masks written before an error stay.
+LUMIHULL_API KeyReport key_capture(Capture& capture, const KeyOptions& options, Job& job);
+
+}  // namespace lumihull::hull
