@@ -84,8 +84,8 @@ Job& Program::job() {
   return *job_;
 }
 
-CLI::App* Program::verb(const std::string& name, const std::string& help, std::function<void()> body) {
-  CLI::App* verb = app.add_subcommand(name, help);
+CLI::App* Program::verb(const std::string& name, const std::string& help, std::function<void()> body, CLI::App* above) {
+  CLI::App* verb = (above ? above : &app)->add_subcommand(name, help);
   verb->callback([this, body = std::move(body)] { chosen_ = body; });
   return verb;
 }
@@ -218,7 +218,7 @@ void say_result(Program& program, const slf::StageResult& result) {
 std::string results_json(const std::vector<slf::StageResult>& results) {
   std::string text = "{\"stages\": {";
   for (const slf::StageResult& result : results) {
-    text += (&result == results.data() ? "" : ", ") + json_text(result.stage) +
+    text += std::string(&result == results.data() ? "" : ", ") + json_text(result.stage) +
             ": {\"skipped\": " + (result.skipped ? "true" : "false") +
             ", \"seconds\": " + std::to_string(result.record.seconds) +
             ", \"peak_bytes\": " + std::to_string(result.record.peak_bytes) + ", \"said\": [";

@@ -30,7 +30,9 @@ class Program {
   Job& job();
 
   /// A verb: its body runs after all flags were parsed.
-  CLI::App* verb(const std::string& name, const std::string& help, std::function<void()> body);
+  /// Below another verb where `above` is given.
+  CLI::App* verb(const std::string& name, const std::string& help, std::function<void()> body,
+                 CLI::App* above = nullptr);
 
   /// A line for people: standard output, or standard error with --json.
   void say(const std::string& line);

@@ -1,0 +1,82 @@
+// lumihull export FORMAT CAPTURE -o FILE: cameras and models for other programs.
+
+#include <lumihull/base/error.h>
+#include <lumihull/base/export.h>
+#include <lumihull/base/files.h>
+#include <lumihull/hull/mesh.h>
+
+#include <iostream>
+
+#include "program.h"
+
+namespace lumihull::program {
+
+namespace {
+
+struct Arguments {
+  std::string folder, output;
+  double max_refit_error = 0.5;
+};
+
+void refuse_existing(const std::string& file) {
+  if (std::filesystem::exists(file)) throw Error(ErrorCode::invalid_argument, "the file exists; name a new one", file);
+}
+
+void say_exported(Program& program, const Arguments& a, const ExportReport& report) {
+  program.say(a.output + ": " + std::to_string(report.photos) + " photographs, largest lens error " +
+              std::to_string(report.largest_refit_error_px) + " px");
+  for (const std::string& note : report.notes) program.say("note: " + note);
+  if (program.json)
+    std::cout << "{\"output\": " << json_text(a.output) << ", \"photos\": " << report.photos
+              << ", \"largest_refit_error_px\": " << report.largest_refit_error_px << "}\n";
+}
+
+}  // namespace
+
+void add_export(Program& program) {
+  const auto a = std::make_shared<Arguments>();
+  CLI::App* verb = program.app.add_subcommand("export", "cameras and models for other programs");
+  verb->require_subcommand(1);
+
+  const auto format = [&](const std::string& name, const std::string& help, std::function<void()> body) {
+    CLI::App* sub = program.verb(name, help, std::move(body), verb);
+    sub->add_option("capture", a->folder, "folder of the capture")->required();
+    sub->add_option("-o,--output", a->output, "what to write")->required();
+    return sub;
+  };
+  const auto options = [a] { return ExportOptions{.max_refit_error_px = a->max_refit_error}; };
+
+  for (CLI::App* sub : {format("colmap", "a COLMAP text model: a folder",
+                               [&program, a, options] {
+                                 say_exported(program, *a,
+                                              export_colmap(Capture::open(a->folder), a->output, options()));
+                               }),
+                        format("nerf", "NeRF's transforms.json", [&program, a, options] {
+                          refuse_existing(a->output);
+                          say_exported(program, *a, export_nerf(Capture::open(a->folder), a->output, options()));
+                        })})
+    sub->add_option("--max-refit-error", a->max_refit_error, "largest error of a lens in the other model, px [0.5]");
+
+  for (const std::string name : {"ply", "obj"})
+    format(name, name == "ply" ? "the hull as a PLY mesh" : "the hull as an OBJ mesh", [&program, a, name] {
+      refuse_existing(a->output);
+      const Capture capture = Capture::open(a->folder);
+      const hull::Mesh mesh = hull::read_mesh(capture.hull_path());
+      const std::filesystem::path file(a->output);
+      if (file.extension() != "." + name)
+        throw Error(ErrorCode::invalid_argument, "expected a file name that ends in ." + name, a->output);
+      hull::write_mesh(file, mesh);
+      program.say(a->output + ": " + std::to_string(mesh.triangles.size()) + " triangles");
+    });
+  format("glb", "the textured model as binary glTF", [&program, a] {
+    refuse_existing(a->output);
+    const Capture capture = Capture::open(a->folder);
+    const std::filesystem::path model = capture.folder() / "textured.glb";
+    if (!std::filesystem::exists(model))
+      throw Error(ErrorCode::not_found, "there is no model yet; `lumihull run` makes one", model.string());
+    write_file(a->output, read_file(model));
+    program.say(a->output + ": " + std::to_string(std::filesystem::file_size(a->output)) + " bytes");
+  });
+}
+
+}  // namespace lumihull::program
