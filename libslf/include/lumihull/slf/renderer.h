@@ -1,0 +1,35 @@
+#pragma once
+
+#include <lumihull/base/api.h>
+#include <lumihull/base/camera.h>
+#include <lumihull/base/image.h>
+#include <lumihull/base/job.h>
+#include <lumihull/hull/mesh.h>
+#include <lumihull/hull/ray_scene.h>
+#include <lumihull/slf/textured_mesh.h>
+
+namespace lumihull::slf {
+
+struct RenderOptions {
+  int rays = 2;        ///< n x n rays a pixel, 1 … 8
+  bool depth = false;  ///< fill Rendering::depth
+};
+
+/// A new view.
+struct Rendering {
+  Image rgba;   ///< 8-bit sRGB, straight alpha = share of the pixel's rays that hit the object; (0, 0, 0, 0) where none
+                ///< did
+  Image depth;  ///< float, 1 channel: smallest z in the camera's frame over the pixel's rays, world units; infinity
+                ///< where none hit; empty unless asked for
+};
+
+/// Renders a textured mesh from any camera, with its lens distortion. Colours are averaged over a pixel's rays in
+/// linear light. `scene` must be made from textured.mesh. Errors: invalid_argument (options, camera), cancelled.
+LUMIHULL_API Rendering render_texture(const TexturedMesh& textured, const hull::RayScene& scene, const View& view,
+                                      const RenderOptions& options, Job& job);
+
+/// Renders the bare geometry: grey, lit from the camera, smooth normals.
+LUMIHULL_API Rendering render_shaded(const hull::Mesh& mesh, const hull::RayScene& scene, const View& view,
+                                     const RenderOptions& options, Job& job);
+
+}  // namespace lumihull::slf

@@ -1,0 +1,79 @@
+#include <lumihull/base/parallel.h>
+#include <lumihull/slf/renderer.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "color.h"
+#include "frame.h"
+
+namespace lumihull::slf {
+namespace {
+
+/// Colours every sample by `color_of(sample)`.
+template <class ColorOf>
+Rendering render_with(const View& view, const RenderOptions& options, const hull::RayScene& scene,
+                      const hull::Mesh& mesh, Job& job, const ColorOf& color_of) {
+  Frame frame(view, options);
+  job.begin("rendering", frame.tiles());
+  parallel_for(
+      job, frame.tiles(),
+      [&](std::size_t i) {
+        const Tile tile = frame.tile(i);
+        const std::vector<SurfaceSample> samples = frame.trace(tile, scene, mesh);
+        std::vector<LinearColor> colors(samples.size());
+        for (std::size_t s = 0; s < samples.size(); ++s) colors[s] = color_of(samples[s]);
+        frame.resolve(tile, samples, colors);
+      },
+      true);
+  job.end();
+  return frame.finish();
+}
+
+/// Bilinear in linear light; (u, v) in texels, the first one's centre at (0.5, 0.5).
+LinearColor sample_texture(const Image& texture, float u, float v) {
+  const auto& linear = linear_of_srgb8();
+  const int w = texture.width(), h = texture.height();
+  const float x = std::clamp(u - 0.5f, 0.0f, float(w - 1)), y = std::clamp(v - 0.5f, 0.0f, float(h - 1));
+  const int x0 = std::min(int(x), w - 1), y0 = std::min(int(y), h - 1);
+  const int x1 = std::min(x0 + 1, w - 1), y1 = std::min(y0 + 1, h - 1);
+  const float fx = x - float(x0), fy = y - float(y0);
+  const std::uint8_t *top = texture.row<std::uint8_t>(y0), *bottom = texture.row<std::uint8_t>(y1);
+  float c[3];
+  for (int i = 0; i < 3; ++i) {
+    const float a = linear[top[3 * x0 + i]] * (1 - fx) + linear[top[3 * x1 + i]] * fx;
+    const float b = linear[bottom[3 * x0 + i]] * (1 - fx) + linear[bottom[3 * x1 + i]] * fx;
+    c[i] = a * (1 - fy) + b * fy;
+  }
+  return {c[0], c[1], c[2], 1};
+}
+
+}  // namespace
+
+Rendering render_texture(const TexturedMesh& textured, const hull::RayScene& scene, const View& view,
+                         const RenderOptions& options, Job& job) {
+  validate(textured, "textured mesh");
+  const float w = float(textured.texture.width()), h = float(textured.texture.height());
+  return render_with(view, options, scene, textured.mesh, job, [&](const SurfaceSample& s) {
+    const auto& uv = textured.uv[s.hit.triangle];
+    const Eigen::Vector2f at = uv[0] + s.hit.b1 * (uv[1] - uv[0]) + s.hit.b2 * (uv[2] - uv[0]);
+    return sample_texture(textured.texture, at.x() * w, at.y() * h);
+  });
+}
+
+Rendering render_shaded(const hull::Mesh& mesh, const hull::RayScene& scene, const View& view,
+                        const RenderOptions& options, Job& job) {
+  const std::vector<Eigen::Vector3f> normals = hull::vertex_normals(mesh);
+  const Eigen::Vector3f eye = view.center().cast<float>();
+  return render_with(view, options, scene, mesh, job, [&](const SurfaceSample& s) {
+    const auto& t = mesh.triangles[s.hit.triangle];
+    const Eigen::Vector3f n =
+        (normals[t[0]] + s.hit.b1 * (normals[t[1]] - normals[t[0]]) + s.hit.b2 * (normals[t[2]] - normals[t[0]]))
+            .normalized();
+    const float lit = std::abs(n.dot((eye - s.point).normalized()));
+    const float grey = 0.06f + 0.64f * lit;
+    return LinearColor{grey, grey, grey, 1};
+  });
+}
+
+}  // namespace lumihull::slf
