@@ -23,11 +23,11 @@ struct KeyOptions {
   ///   "regions"    the rectangles named in `regions`
   ///   a path       a key that was saved before (JSON)
   std::string background = "auto";
-  std::string regions;                 ///< "NAME:x,y,width,height;…", px; for background = "regions"
-  int k = 7;                           ///< neighbours asked (paper, eq. 9)
-  double foreground_share = 0.2;       ///< uniform foreground samples as a share of the background's
-  std::size_t max_samples = 100'000;   ///< background samples kept of all that were seen
-  std::uint64_t seed = 1;              ///< of the uniform foreground samples
+  std::string regions;                ///< "NAME:x,y,width,height;…", px; for background = "regions"
+  int k = 7;                          ///< neighbours asked (paper, eq. 9)
+  double foreground_share = 0.2;      ///< uniform foreground samples as a share of the background's
+  std::size_t max_samples = 100'000;  ///< background samples kept of all that were seen
+  std::uint64_t seed = 1;             ///< of the uniform foreground samples
   calib::EdgeMode edges = calib::EdgeMode::soft;
   /// Regularised silhouettes: specks and pinholes go, and what training on the photographs themselves learns of the
   /// object's place and colours is used. Off: the paper's pure decision, pixel by pixel.

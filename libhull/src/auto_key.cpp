@@ -1,0 +1,173 @@
+#include <lumihull/base/error.h>
+#include <lumihull/base/parallel.h>
+#include <lumihull/calib/background.h>
+#include <lumihull/hull/auto_key.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "learn_key.h"
+
+namespace lumihull::hull {
+namespace {
+
+[[noreturn]] void fail(const std::string& message) { throw Error(ErrorCode::invalid_argument, message, "key options"); }
+
+calib::ColorKey train(const std::vector<calib::ColorCount>& background, const KeyOptions& options, Job& job) {
+  std::vector<calib::Rgb> list;
+  for (const auto& s : calib::subsample(background, options.max_samples)) list.insert(list.end(), s.count, s.color);
+  return calib::ColorKey::train(list, {options.k, options.foreground_share, options.seed}, job);
+}
+
+calib::ColorKey key_of_enclosure(const Capture& capture, const KeyOptions& options, Job& job) {
+  if (capture.enclosure.empty())
+    throw Error(ErrorCode::not_found,
+                "the capture has no photographs of the empty enclosure: expected them in enclosure/",
+                capture.folder().string());
+  calib::ColorHistogram histogram;
+  job.begin("reading the empty enclosure", capture.enclosure.size());
+  parallel_for(
+      job, capture.enclosure.size(),
+      [&](std::size_t i) {
+        histogram.add_pixels(calib::keyable(read_image(capture.photo_path(capture.enclosure[i]), {.channels = 3})));
+      },
+      true);
+  job.end();
+  return train(histogram.counts(), options, job);
+}
+
+calib::ColorKey key_of_regions(const Capture& capture, const KeyOptions& options, Job& job) {
+  const std::vector<calib::Region> regions = calib::parse_regions(options.regions);
+  calib::ColorHistogram histogram;
+  for (const calib::Region& region : regions) {
+    job.check();
+    const auto shot =
+        std::find_if(capture.shots.begin(), capture.shots.end(), [&](const Shot& s) { return s.name == region.photo; });
+    if (shot == capture.shots.end())
+      throw Error(ErrorCode::invalid_argument, "the regions name a photograph that the capture does not have",
+                  region.photo);
+    const Image photo = calib::keyable(capture.read_photo(std::size_t(shot - capture.shots.begin())));
+    if (region.x > photo.width() - region.width || region.y > photo.height() - region.height)
+      throw Error(ErrorCode::invalid_argument,
+                  "a region reaches beyond the photograph of " + std::to_string(photo.width()) + " x " +
+                      std::to_string(photo.height()) + " pixels",
+                  region.photo);
+    for (int y = region.y; y < region.y + region.height; ++y) {
+      const std::uint8_t* p = photo.row<std::uint8_t>(y) + 3 * region.x;
+      for (int x = 0; x < region.width; ++x, p += 3) histogram.add({p[0], p[1], p[2]});
+    }
+  }
+  return train(histogram.counts(), options, job);
+}
+
+/// Sets to background what is outside the frame or outside a coarse silhouette.
+void confine(Image& mask, const calib::Frame& frame, const Image* coarse, int step) {
+  for (int y = 0; y < mask.height(); ++y) {
+    std::uint8_t* row = mask.row<std::uint8_t>(y);
+    const std::uint8_t* near = coarse ? coarse->row<std::uint8_t>(std::min(y / step, coarse->height() - 1)) : nullptr;
+    for (int x = 0; x < mask.width(); ++x) {
+      const bool inside = y >= frame.y0 && y < frame.y1 && x >= frame.x0 && x < frame.x1 &&
+                          (!near || near[std::min(x / step, coarse->width() - 1)]);
+      if (!inside) row[x] = 0;
+    }
+  }
+}
+
+}  // namespace
+
+void KeyOptions::validate() const {
+  calib::ColorKeyOptions{k, foreground_share, seed}.validate();
+  if (background.empty()) fail("background: expected auto, enclosure, photos, regions or a key file");
+  if (max_samples < 100 || max_samples > 1'000'000) fail("max samples: expected 100 to 1000000");
+  if (background == "regions") calib::parse_regions(regions);
+  if (background != "regions" && !regions.empty()) fail("regions are used with background = regions only");
+}
+
+KeyReport key_capture(Capture& capture, const KeyOptions& options, Job& job) {
+  options.validate();
+  if (capture.shots.empty())
+    throw Error(ErrorCode::not_found, "the capture has no photographs", capture.folder().string());
+
+  KeyReport report;
+  std::vector<std::size_t> training, todo;
+  for (std::size_t i = 0; i < capture.shots.size(); ++i) {
+    if (!capture.held_out(i)) training.push_back(i);
+    const MaskSource source = capture.mask_state(capture.shots[i]);
+    if (source == MaskSource::imported || source == MaskSource::edited)
+      ++report.kept;
+    else
+      todo.push_back(i);
+  }
+
+  std::optional<LearnedKey> learned;
+  std::optional<calib::ColorKey> key;
+  const std::string source = options.background != "auto" ? options.background
+                             : capture.enclosure.empty()  ? "photos"
+                                                          : "enclosure";
+  report.source = source;
+  if (source == "enclosure") {
+    key = key_of_enclosure(capture, options, job);
+  } else if (source == "regions") {
+    key = key_of_regions(capture, options, job);
+  } else if (source == "photos") {
+    learned = learn_key(capture, training, options, job);
+    key = learned->key;
+    report.rounds = learned->rounds;
+    if (learned->hull) report.source = "photos and cameras";
+  } else {
+    key = calib::ColorKey::load(source, job);
+    report.source = "file";
+  }
+
+  std::vector<double> object_share(todo.size());  // of the picture
+  job.begin("keying", todo.size());
+  parallel_for(
+      job, todo.size(),
+      [&](std::size_t i) {
+        const std::size_t shot = todo[i];
+        const Image photo = calib::keyable(capture.read_photo(shot));
+        const double pixels = double(photo.width()) * photo.height();
+        calib::KeyImageOptions how{calib::EdgeMode::hard, 0, 0};
+        Image mask = calib::key_image(*key, photo, how);
+        if (learned) {
+          CoarseView view;
+          view.step = thinning_step(photo.width(), photo.height());
+          std::optional<Image> near;
+          if (learned->hull && capture.positioned(shot)) {
+            view.view = capture.view(shot);
+            view.mask = Image(std::max(1, photo.width() / view.step), std::max(1, photo.height() / view.step), 1);
+            near = learned->hull->silhouette(view, 3 + int(std::ceil(learned->hull->voxel_px(view))));
+          }
+          confine(mask, calib::find_frame(photo), near ? &*near : nullptr, view.step);
+        }
+        if (options.clean) calib::clean_mask(mask, int(pixels * 2e-4), int(pixels * 1e-4));
+        calib::soften_edges(mask, photo, options.edges);
+        std::size_t object = 0;
+        for (int y = 0; y < mask.height(); ++y) {
+          const std::uint8_t* row = mask.row<std::uint8_t>(y);
+          object += std::size_t(std::count_if(row, row + mask.width(), [](std::uint8_t v) { return v >= 128; }));
+        }
+        object_share[i] = double(object) / pixels;
+        capture.write_mask(shot, mask, MaskSource::keyed);  // touches its own shot alone
+      },
+      true);
+  job.end();
+
+  std::size_t unusable = 0;
+  for (std::size_t i = 0; i < todo.size(); ++i) {
+    if (object_share[i] > 0 && object_share[i] < 1) continue;
+    ++unusable;
+    report.warnings.push_back(capture.shots[todo[i]].name + (object_share[i] > 0 ? ": everything was keyed as object"
+                                                                                 : ": nothing was keyed as object"));
+  }
+  report.keyed = todo.size();
+  if (!todo.empty() && unusable == todo.size())
+    throw Error(ErrorCode::degenerate,
+                "the masks of all photographs are empty or full: give photographs of the empty enclosure, or regions",
+                capture.folder().string());
+  key->save(capture.folder() / "key.json");
+  if (!capture.background_rgb) capture.background_rgb = key->background_median();
+  return report;
+}
+
+}  // namespace lumihull::hull
