@@ -230,7 +230,8 @@ std::string results_json(const std::vector<slf::StageResult>& results) {
 
 }  // namespace
 
-void add_stage_verb(Program& program, const std::string& stage, const std::string& help) {
+void add_stage_verb(Program& program, const std::string& stage, const std::string& help,
+                    std::function<std::string(const Capture&)> json) {
   struct Arguments {
     std::string folder;
     bool force = false;
@@ -239,7 +240,7 @@ void add_stage_verb(Program& program, const std::string& stage, const std::strin
     CLI::Option* hold_out_given = nullptr;
   };
   const auto a = std::make_shared<Arguments>();
-  CLI::App* verb = program.verb(stage, help, [&program, stage, a] {
+  CLI::App* verb = program.verb(stage, help, [&program, stage, a, json] {
     Capture capture = Capture::open(a->folder);
     a->options->store(capture);
     if (a->hold_out_given->count()) capture.set_hold_out(a->hold_out);
@@ -250,7 +251,7 @@ void add_stage_verb(Program& program, const std::string& stage, const std::strin
       results = {slf::run_stage(capture, stage, program.job(), a->force)};
     for (const slf::StageResult& result : results) say_result(program, result);
     if (stage == "run") program.say("report    " + (capture.folder() / "report.html").string());
-    if (program.json) std::cout << results_json(results) << "\n";
+    if (program.json) std::cout << (json ? json(capture) : results_json(results) + "\n");
   });
   verb->add_option("capture", a->folder, "folder of the capture")->required();
   verb->add_flag("--force", a->force, "do it even if nothing has changed");

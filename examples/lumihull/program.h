@@ -68,8 +68,10 @@ class StageFlags {
 };
 
 /// A verb that does one stage, or all that are needed where `stage` is "run": CAPTURE, --force, --hold-out and the
-/// stages' own options; says what came of each stage.
-void add_stage_verb(Program& program, const std::string& stage, const std::string& help);
+/// stages' own options; says what came of each stage. With --json it prints what the stages took, or, where `json` is
+/// given, what that returns.
+void add_stage_verb(Program& program, const std::string& stage, const std::string& help,
+                    std::function<std::string(const Capture&)> json = {});
 
 std::string json_text(const std::string& s);  ///< s as a JSON string, with its quotes
 

@@ -57,5 +57,6 @@ void add_cameras(const Capture& capture, InputDigest& digest);  ///< intrinsics,
 void add_masks(const Capture& capture, InputDigest& digest);    ///< bytes of all masks
 
 std::filesystem::path textured_path(const Capture& capture);
+std::filesystem::path evaluation_path(const Capture& capture);
 
 }  // namespace lumihull::slf

@@ -29,7 +29,7 @@ struct OptionSpec {
   std::string help;      ///< one line
   OptionValue fallback;  ///< the default; its type is the option's type
   double low = -std::numeric_limits<double>::max(), high = std::numeric_limits<double>::max();  ///< numbers' range
-  std::vector<std::string> choices;  ///< of a string; empty: any
+  std::vector<std::string> choices = {};  ///< of a string; empty: any
 };
 
 /// Errors: invalid_argument (no such stage).

@@ -1,0 +1,95 @@
+#include <lumihull/base/files.h>
+#include <lumihull/slf/evaluate.h>
+#include <lumihull/slf/photos.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+
+#include "stage.h"
+
+namespace lumihull::slf {
+
+namespace {
+
+std::filesystem::path reference_folder(const Capture& capture) {
+  return effective<std::string>(capture, "evaluate", "reference_masks");
+}
+
+bool needed(const Capture& capture, std::string& why) {
+  if (!held_out_shots(capture).empty()) return true;
+  why = "no photograph is held out (--hold-out N)";
+  return false;
+}
+
+void inputs(const Capture& capture, InputDigest& digest) {
+  add_photos(capture, digest);
+  add_cameras(capture, digest);
+  add_masks(capture, digest);
+  digest.add_file("model", textured_path(capture));
+  if (capture.background_rgb)
+    digest.add("background", {reinterpret_cast<const char*>(capture.background_rgb->data()), 3});
+  const std::filesystem::path references = reference_folder(capture);
+  if (references.empty()) return;
+  for (const std::size_t i : held_out_shots(capture)) {
+    const std::string& name = capture.shots[i].name;
+    digest.add_file("reference " + name, references / (name + ".png"));
+  }
+}
+
+bool present(const Capture& capture) {
+  std::error_code error;
+  return std::filesystem::exists(evaluation_path(capture), error);
+}
+
+std::vector<std::string> run(Capture& capture, Job& job) {
+  EvaluateOptions options;
+  options.reference_masks = reference_folder(capture);
+  options.render.rays = int(effective<std::int64_t>(capture, "evaluate", "rays"));
+  options.lumigraph.photographs = int(effective<std::int64_t>(capture, "evaluate", "photographs"));
+  const Evaluation evaluation = evaluate_capture(capture, options, job);
+  write_file(evaluation_path(capture), evaluation.to_json() + "\n");
+
+  std::vector<std::string> said;
+  char line[200];
+  std::snprintf(line, sizeof line, "%zu photographs held out; silhouettes' IoU %.4f", evaluation.photos_held_out,
+                evaluation.mean.silhouette_iou);
+  said.emplace_back(line);
+  if (!std::isnan(evaluation.mean.keyed_iou)) {
+    std::snprintf(line, sizeof line, "keyed silhouettes' IoU %.4f", evaluation.mean.keyed_iou);
+    said.emplace_back(line);
+  }
+  for (const auto& [method, quality] : evaluation.mean.methods) {
+    std::snprintf(line, sizeof line, "%-13s PSNR %.2f dB, SSIM %.4f; inside %.2f dB, %.4f", method.c_str(),
+                  quality.psnr, quality.ssim, quality.psnr_inside, quality.ssim_inside);
+    said.emplace_back(line);
+  }
+  return said;
+}
+
+}  // namespace
+
+std::filesystem::path evaluation_path(const Capture& capture) {
+  return capture.folder() / "evaluate" / "evaluation.json";
+}
+
+const StageDefinition& evaluate_stage() {
+  static const EvaluateOptions defaults;
+  static const StageDefinition stage{
+      "evaluate",
+      1,
+      {
+          {"reference_masks", "folder of masks to judge by, named like the photographs; empty: the capture's own",
+           std::string()},
+          {"rays", "n x n rays a pixel", std::int64_t(defaults.render.rays), 1, 8},
+          {"photographs", "blended at a point of the lumigraph", std::int64_t(defaults.lumigraph.photographs), 1, 16},
+      },
+      needed,
+      inputs,
+      present,
+      run};
+  return stage;
+}
+
+}  // namespace lumihull::slf

@@ -1,0 +1,90 @@
+#include <lumihull/internal/json.h>
+#include <lumihull/slf/evaluate.h>
+#include <lumihull/slf/report.h>
+
+#include <filesystem>
+#include <optional>
+#include <system_error>
+
+#include "stage.h"
+
+namespace lumihull::slf {
+
+namespace {
+
+using internal::JsonReader;
+
+double number_or_nan(const JsonReader& json, std::string_view key) {
+  if (!json.has(key) || json.at(key).value().is_null()) return std::numeric_limits<double>::quiet_NaN();
+  return json.at(key).number();
+}
+
+ViewEvaluation read_view(const JsonReader& json) {
+  ViewEvaluation view;
+  if (json.has("name")) view.name = json.at("name").string();
+  view.silhouette_iou = number_or_nan(json, "silhouette_iou");
+  view.keyed_iou = number_or_nan(json, "keyed_iou");
+  const JsonReader methods = json.at("methods");
+  if (!methods.value().is_object()) methods.fail("an object");
+  for (const auto& item : methods.value().items()) {
+    const JsonReader m = methods.at(item.key());
+    view.methods[item.key()] = {.psnr = number_or_nan(m, "psnr"),
+                                .ssim = number_or_nan(m, "ssim"),
+                                .psnr_inside = number_or_nan(m, "psnr_inside"),
+                                .ssim_inside = number_or_nan(m, "ssim_inside")};
+  }
+  return view;
+}
+
+/// What the stage `evaluate` found, if it ran: evaluate/evaluation.json.
+std::optional<Evaluation> read_evaluation(const Capture& capture) {
+  const std::filesystem::path file = evaluation_path(capture);
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) return std::nullopt;
+  const internal::Json document = internal::read_json(file);
+  const JsonReader top(document, file.string());
+  Evaluation evaluation;
+  evaluation.photos_used = std::size_t(top.at("photos_used").integer(0, 1'000'000));
+  evaluation.photos_held_out = std::size_t(top.at("photos_held_out").integer(0, 1'000'000));
+  evaluation.triangles = std::size_t(top.at("triangles").integer(0, INT64_MAX));
+  evaluation.model_bytes = std::uint64_t(top.at("model_bytes").integer(0, INT64_MAX));
+  evaluation.mean = read_view(top);
+  const JsonReader views = top.at("views");
+  const std::size_t n = views.array_size(1'000'000);
+  for (std::size_t i = 0; i < n; ++i) evaluation.views.push_back(read_view(views.at(i)));
+  return evaluation;
+}
+
+bool needed(const Capture&, std::string&) { return true; }
+
+void inputs(const Capture& capture, InputDigest& digest) {
+  for (const auto& [name, record] : capture.stages)
+    if (name != "report") digest.add(name, record.digest + record.finished);
+  add_photos(capture, digest);
+  add_masks(capture, digest);
+  digest.add_file("hull", capture.hull_path());
+  digest.add_file("model", textured_path(capture));
+  digest.add_file("evaluation", evaluation_path(capture));
+}
+
+std::filesystem::path report_path(const Capture& capture) { return capture.folder() / "report.html"; }
+
+bool present(const Capture& capture) {
+  std::error_code error;
+  return std::filesystem::exists(report_path(capture), error);
+}
+
+std::vector<std::string> run(Capture& capture, Job& job) {
+  const std::optional<Evaluation> evaluation = read_evaluation(capture);
+  write_report(capture, {.file = report_path(capture), .evaluation = evaluation ? &*evaluation : nullptr}, job);
+  return {report_path(capture).string()};
+}
+
+}  // namespace
+
+const StageDefinition& report_stage() {
+  static const StageDefinition stage{"report", 1, {}, needed, inputs, present, run};
+  return stage;
+}
+
+}  // namespace lumihull::slf
