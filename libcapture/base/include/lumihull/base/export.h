@@ -1,0 +1,37 @@
+#pragma once
+
+#include <lumihull/base/api.h>
+#include <lumihull/base/capture.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace lumihull {
+
+struct ExportOptions {
+  /// Export fails where another program's camera model would move a pixel farther than this.
+  double max_refit_error_px = 0.5;
+};
+
+/// What an export had to change.
+struct ExportReport {
+  int photos = 0;                     ///< positioned photographs: the others can't be expressed
+  double largest_refit_error_px = 0;  ///< 0 where every camera is expressed exactly
+  std::vector<std::string> notes;
+};
+
+/// Writes a COLMAP text model (cameras.txt, images.txt, an empty points3D.txt) into a new or empty folder. Image names
+/// are the photographs' file names. Cameras: PINHOLE where there is no lens distortion, else OPENCV or, where that is
+/// off by more than 0.01 px, FULL_OPENCV. Errors: invalid_argument (folder in use), unsupported (a camera that COLMAP
+/// can't express to max_refit_error_px, e.g. with a skew; the message gives the error), bad_input (no positioned
+/// photograph).
+LUMIHULL_API ExportReport export_colmap(const Capture& capture, const std::filesystem::path& folder,
+                                        const ExportOptions& options = {});
+
+/// Writes NeRF's transforms.json with intrinsics for each frame: fl_x, fl_y, cx, cy, w, h, and k1, k2, p1, p2, k3
+/// (OpenCV's lens) where there is distortion. file_path is relative to the JSON file's folder. The same errors.
+LUMIHULL_API ExportReport export_nerf(const Capture& capture, const std::filesystem::path& file,
+                                      const ExportOptions& options = {});
+
+}  // namespace lumihull
