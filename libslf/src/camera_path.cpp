@@ -1,0 +1,184 @@
+#include <lumihull/base/error.h>
+#include <lumihull/base/files.h>
+#include <lumihull/internal/json.h>
+#include <lumihull/slf/camera_path.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <set>
+
+namespace lumihull::slf {
+namespace {
+
+using internal::Json;
+using internal::JsonReader;
+
+constexpr int kMostViews = 100000;
+constexpr double kDegree = std::numbers::pi / 180;
+
+void require(bool good, const char* what) {
+  if (!good) throw Error(ErrorCode::invalid_argument, what, "turntable options");
+}
+
+Eigen::Vector3d vector_at(const JsonReader& r) {
+  if (r.array_size(3) != 3) r.fail("three numbers");
+  return {r.at(std::size_t(0)).number(), r.at(std::size_t(1)).number(), r.at(std::size_t(2)).number()};
+}
+
+double number_or(const JsonReader& r, std::string_view key, double fallback) {
+  return r.has(key) ? r.at(key).number() : fallback;
+}
+
+Pose pose_at(const JsonReader& r) {
+  if (r.has("eye")) {
+    const Eigen::Vector3d eye = vector_at(r.at("eye")), target = vector_at(r.at("target")), up = vector_at(r.at("up"));
+    const Eigen::Vector3d forward = target - eye;
+    if (!(forward.cross(up).norm() > 1e-9 * forward.norm() * up.norm()))
+      r.fail("an eye apart from its target, and an up that is not along the view");
+    return look_at(eye, target, up);
+  }
+  const JsonReader pose = r.at("cam_from_world"), q = pose.at("rotation_wxyz");
+  if (q.array_size(4) != 4) q.fail("four numbers");
+  double w[4];
+  for (std::size_t i = 0; i < 4; ++i) w[i] = q.at(i).number(-1e6, 1e6);
+  const Eigen::Quaterniond rotation(w[0], w[1], w[2], w[3]);
+  if (!(std::abs(rotation.norm() - 1) < 1e-3)) q.fail("a quaternion of length 1");
+  return {rotation.normalized(), vector_at(pose.at("translation"))};
+}
+
+Camera camera_at(const JsonReader& r) {
+  Camera c;
+  c.width = int(r.at("width").integer(1, kMaxImageSide));
+  c.height = int(r.at("height").integer(1, kMaxImageSide));
+  if (std::int64_t(c.width) * c.height > kMaxImagePixels) r.fail("a picture of at most 400 megapixels");
+  c.f = r.at("f").number();
+  c.s = number_or(r, "s", 1), c.skew = number_or(r, "skew", 0);
+  c.u0 = number_or(r, "u0", 0.5 * c.width), c.v0 = number_or(r, "v0", 0.5 * c.height);
+  c.k1 = number_or(r, "k1", 0), c.k2 = number_or(r, "k2", 0), c.k3 = number_or(r, "k3", 0);
+  c.p1 = number_or(r, "p1", 0), c.p2 = number_or(r, "p2", 0);
+  try {
+    c.validate();
+  } catch (const Error& e) {
+    r.fail("a valid camera (" + e.message() + ")");
+  }
+  return c;
+}
+
+}  // namespace
+
+std::string frame_name(std::size_t i) {
+  char name[32];
+  std::snprintf(name, sizeof name, "frame_%04zu", i);
+  return name;
+}
+
+Eigen::Vector3d up_axis(std::span<const View> views) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const View& view : views) sum -= view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitY();
+  return sum.norm() > 1e-6 * double(views.size()) ? Eigen::Vector3d(sum.normalized()) : Eigen::Vector3d::UnitZ();
+}
+
+std::vector<PathView> turntable(const hull::Mesh& mesh, std::span<const View> photographs, const TurntableOptions& o) {
+  require(o.frames >= 1 && o.frames <= kMostViews, "frames: expected 1 to 100000");
+  require(o.elevation_deg >= -90 && o.elevation_deg <= 90, "elevation_deg: expected -90 to 90");
+  require(o.distance >= 0 && std::isfinite(o.distance), "distance: expected 0 or more");
+  require(std::isfinite(o.start_deg), "start_deg: expected a number");
+  require(o.width >= 1 && o.width <= kMaxImageSide && o.height >= 1 && o.height <= kMaxImageSide &&
+              std::int64_t(o.width) * o.height <= kMaxImagePixels,
+          "width, height: expected a picture of at most 400 megapixels");
+  require(o.field_of_view_deg >= 1 && o.field_of_view_deg <= 150, "field_of_view_deg: expected 1 to 150");
+  if (mesh.triangles.empty()) throw Error(ErrorCode::degenerate, "the mesh has no triangles to turn around");
+
+  const Eigen::Vector3d up = up_axis(photographs);
+  Eigen::AlignedBox3d box;
+  for (const auto& t : mesh.triangles)
+    for (const auto v : t) box.extend(mesh.vertices[v].cast<double>());
+  const Eigen::Vector3d middle = box.center();
+  Eigen::Vector3d right =
+      photographs.empty() ? Eigen::Vector3d(1, 0, 0) : Eigen::Vector3d(photographs[0].center() - middle);
+  right -= right.dot(up) * up;
+  if (!(right.norm() > 1e-9 * box.diagonal().norm())) right = up.unitOrthogonal();
+  right.normalize();
+  const Eigen::Vector3d across = up.cross(right);
+
+  Camera camera;
+  camera.width = o.width, camera.height = o.height;
+  camera.f = 0.5 * o.height / std::tan(0.5 * o.field_of_view_deg * kDegree);
+  camera.u0 = 0.5 * o.width, camera.v0 = 0.5 * o.height;
+  double distance = o.distance;
+  if (distance == 0) {
+    double radius = 0;
+    for (const auto& t : mesh.triangles)
+      for (const auto v : t) radius = std::max(radius, (mesh.vertices[v].cast<double>() - middle).norm());
+    const double half = std::atan(0.5 * std::min(o.width, o.height) / camera.f);
+    distance = std::max(1.03 * radius / std::sin(half), 1e-12);
+  }
+  std::vector<PathView> path;
+  const double elevation = o.elevation_deg * kDegree;
+  for (int i = 0; i < o.frames; ++i) {
+    const double azimuth = o.start_deg * kDegree + 2 * std::numbers::pi * i / o.frames;
+    const Eigen::Vector3d outwards = std::cos(azimuth) * right + std::sin(azimuth) * across;
+    const Eigen::Vector3d eye = middle + distance * (std::cos(elevation) * outwards + std::sin(elevation) * up);
+    // Straight from above there is no up: the picture's top is then what lies behind.
+    const Eigen::Vector3d top = std::cos(elevation) * up - std::sin(elevation) * outwards;
+    path.push_back({frame_name(std::size_t(i)), {camera, look_at(eye, middle, top)}});
+  }
+  return path;
+}
+
+std::vector<PathView> read_camera_path(const std::filesystem::path& file) {
+  const Json document = internal::read_json(file);
+  const JsonReader top(document, file.string());
+  internal::check_format(top, "lumihull-cameras", 1);
+  const JsonReader views = top.at("views");
+  const std::size_t count = views.array_size(kMostViews);
+  if (count == 0) views.fail("at least one view");
+  std::vector<PathView> path;
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < count; ++i) {
+    const JsonReader r = views.at(i);
+    PathView view;
+    view.name = r.has("name") ? r.at("name").string(200) : frame_name(i);
+    if (view.name.empty() || view.name[0] == '.' || view.name.find('/') != std::string::npos)
+      r.at("name").fail("a file name without '/' that does not begin with a dot");
+    if (!names.insert(view.name).second) r.fail("names that are not repeated (\"" + view.name + "\")");
+    view.view = {camera_at(r), pose_at(r)};
+    path.push_back(std::move(view));
+  }
+  return path;
+}
+
+void write_camera_path(const std::filesystem::path& file, std::span<const PathView> views) {
+  Json list = Json::array();
+  for (const PathView& v : views) {
+    const Camera& c = v.view.camera;
+    const Pose& p = v.view.cam_from_world;
+    list.push_back({{"name", v.name},
+                    {"width", c.width},
+                    {"height", c.height},
+                    {"f", c.f},
+                    {"s", c.s},
+                    {"skew", c.skew},
+                    {"u0", c.u0},
+                    {"v0", c.v0},
+                    {"k1", c.k1},
+                    {"k2", c.k2},
+                    {"k3", c.k3},
+                    {"p1", c.p1},
+                    {"p2", c.p2},
+                    {"cam_from_world",
+                     {{"rotation_wxyz", {p.rotation.w(), p.rotation.x(), p.rotation.y(), p.rotation.z()}},
+                      {"translation", {p.translation.x(), p.translation.y(), p.translation.z()}}}}});
+  }
+  write_file(file, Json{{"format", "lumihull-cameras"}, {"version", 1}, {"views", list}}.dump(1) + "\n");
+}
+
+std::vector<PathView> views_of_shots(const Capture& capture, std::span<const std::size_t> shots) {
+  std::vector<PathView> path;
+  for (const std::size_t shot : shots) path.push_back({capture.shots.at(shot).name, capture.view(shot)});
+  return path;
+}
+
+}  // namespace lumihull::slf

@@ -1,0 +1,214 @@
+#include <lumihull/base/error.h>
+#include <lumihull/base/files.h>
+#include <lumihull/hull/mesh.h>
+#include <lumihull/slf/camera_path.h>
+#include <lumihull/slf/glb.h>
+#include <lumihull/slf/photos.h>
+#include <lumihull/slf/report.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+#include "html.h"
+
+namespace lumihull::slf {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kSheetPhotos = 48;  // pictures on the contact sheet: enough to see what went wrong, small to send
+constexpr int kThumbnail = 220, kModelPicture = 420, kComparison = 1400;
+
+constexpr const char* kStyle = R"(
+:root{color-scheme:light dark;--line:#8884;--dim:#777}
+body{font:16px/1.5 system-ui,sans-serif;margin:0 auto;max-width:72rem;padding:1rem}
+h1{margin:.5rem 0}h2{margin:2rem 0 .5rem;border-bottom:1px solid var(--line)}
+p{margin:.4rem 0}.dim{color:var(--dim);font-size:.875rem}
+.grid{display:grid;gap:.6rem;grid-template-columns:repeat(auto-fill,minmax(9rem,1fr))}
+.wide{grid-template-columns:repeat(auto-fill,minmax(14rem,1fr))}
+figure{margin:0;border:1px solid var(--line);border-radius:.4rem;overflow:hidden}
+figure img{display:block;width:100%}figcaption{padding:.15rem .4rem;font-size:.8rem;overflow-wrap:anywhere}
+.check{background:#667 repeating-conic-gradient(#0002 0 25%,#0000 0 50%) 0/16px 16px}
+.scroll{overflow-x:auto}table{border-collapse:collapse}
+td,th{padding:.2rem .7rem;border-bottom:1px solid var(--line);text-align:right;white-space:nowrap}
+td:first-child,th:first-child{text-align:left}
+)";
+
+std::string formatted(const char* format, double value) {
+  if (!std::isfinite(value)) return "–";
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string megabytes(std::uint64_t bytes) { return formatted("%.1f MB", double(bytes) / 1e6); }
+
+std::string figure(const Image& picture, const std::string& caption, const char* style = "") {
+  return "<figure><img class=\"" + std::string(style) + "\" loading=\"lazy\" alt=\"" + html_escaped(caption) +
+         "\" src=\"" + data_url(picture) + "\"><figcaption>" + html_escaped(caption) + "</figcaption></figure>\n";
+}
+
+/// What lies outside the mask becomes pale, so that both the photograph and its silhouette are seen.
+Image outlined(const Photo& photo) {
+  Image out = photo.rgb;
+  for (int y = 0; y < out.height(); ++y) {
+    std::uint8_t* p = out.row<std::uint8_t>(y);
+    const std::uint8_t* a = photo.alpha.row<std::uint8_t>(y);
+    for (int x = 0; x < out.width(); ++x)
+      for (int c = 0; c < 3; ++c) {
+        const int pale = c == 1 ? 150 + p[3 * x + c] / 4 : 100 + p[3 * x + c] / 4;
+        p[3 * x + c] = std::uint8_t((p[3 * x + c] * a[x] + pale * (255 - a[x])) / 255);
+      }
+  }
+  return out;
+}
+
+void add_photographs(std::string& page, const Capture& capture, Job& job) {
+  std::vector<std::size_t> shown;
+  const std::size_t n = capture.shots.size(), count = std::min(n, kSheetPhotos);
+  for (std::size_t i = 0; i < count; ++i) shown.push_back(i * n / count);
+  page += "<h2>Photographs and silhouettes</h2>\n<p class=\"dim\">" + std::to_string(count) + " of " +
+          std::to_string(n) + "; pale: not the object.</p>\n<div class=\"grid\">\n";
+  for (const std::size_t shot : shown) {
+    job.check();
+    Photo photo;
+    photo.rgb = capture.read_photo(shot, 3);
+    if (photo.rgb.type() != PixelType::u8) photo.rgb = converted(photo.rgb, PixelType::u8, 3);
+    const Shot& s = capture.shots[shot];
+    std::string caption = s.name;
+    if (capture.mask_state(s) != MaskSource::none) {
+      photo.alpha = capture.read_mask(shot);
+      photo.rgb = outlined(photo);
+    } else {
+      caption += ", no silhouette";
+    }
+    if (!capture.positioned(shot)) caption += ", not positioned";
+    if (capture.held_out(shot)) caption += ", held out";
+    page += figure(oriented(fitted(photo.rgb, kThumbnail), s.orientation), caption);
+    job.advance();
+  }
+  page += "</div>\n";
+}
+
+std::vector<View> positioned_views(const Capture& capture) {
+  std::vector<View> views;
+  for (std::size_t i = 0; i < capture.shots.size(); ++i)
+    if (capture.positioned(i)) views.push_back(capture.view(i));
+  return views;
+}
+
+TurntableOptions around(int frames) {
+  TurntableOptions o;
+  o.frames = frames;
+  o.width = o.height = kModelPicture;
+  return o;
+}
+
+void add_hull(std::string& page, const Capture& capture, Job& job) {
+  const hull::Mesh mesh = hull::read_mesh(capture.hull_path());
+  if (mesh.triangles.empty()) return;
+  const hull::RayScene scene(mesh);
+  page += "<h2>Visual hull</h2>\n<p>" + std::to_string(mesh.triangles.size()) + " triangles, " +
+          std::to_string(mesh.vertices.size()) + " vertices, volume " + formatted("%.4g", hull::enclosed_volume(mesh)) +
+          (capture.unit == Unit::metres ? " m³" : " in the capture's unit") + "</p>\n<div class=\"grid wide\">\n";
+  Job quiet({}, job.threads());
+  for (const PathView& v : turntable(mesh, positioned_views(capture), around(4))) {
+    job.check();
+    page += figure(render_shaded(mesh, scene, v.view, {}, quiet).rgba, "hull", "check");
+    job.advance();
+  }
+  page += "</div>\n";
+}
+
+void add_model(std::string& page, const Capture& capture, int frames, const fs::path& model, Job& job) {
+  const TexturedMesh textured = read_glb(model);
+  const hull::RayScene scene(textured.mesh);
+  page += "<h2>Textured model</h2>\n<p>" + std::to_string(textured.mesh.triangles.size()) + " triangles, texture " +
+          std::to_string(textured.texture.width()) + " × " + std::to_string(textured.texture.height()) + ", " +
+          megabytes(fs::file_size(model)) + "</p>\n<div class=\"grid wide\">\n";
+  Job quiet({}, job.threads());
+  for (const PathView& v : turntable(textured.mesh, positioned_views(capture), around(frames))) {
+    job.check();
+    page += figure(render_texture(textured, scene, v.view, {}, quiet).rgba, v.name, "check");
+    job.advance();
+  }
+  page += "</div>\n";
+}
+
+void add_row(std::string& page, const std::string& name, double iou, const std::string& method,
+             const PictureQuality& q) {
+  page += "<tr><td>" + html_escaped(name) + "</td><td>" + html_escaped(method) + "</td><td>" +
+          formatted("%.2f", q.psnr) + "</td><td>" + formatted("%.4f", q.ssim) + "</td><td>" +
+          formatted("%.2f", q.psnr_inside) + "</td><td>" + formatted("%.4f", q.ssim_inside) + "</td><td>" +
+          formatted("%.4f", iou) + "</td></tr>\n";
+}
+
+void add_evaluation(std::string& page, const Capture& capture, const Evaluation& e) {
+  page += "<h2>Held-out photographs</h2>\n<p>" + std::to_string(e.photos_used) + " photographs used, " +
+          std::to_string(e.photos_held_out) + " held out. Silhouettes of the rendered hull: IoU " +
+          formatted("%.4f", e.mean.silhouette_iou) +
+          (std::isnan(e.mean.keyed_iou) ? "" : "; keyed silhouettes: IoU " + formatted("%.4f", e.mean.keyed_iou)) +
+          ".</p>\n<div class=\"scroll\"><table><tr><th>photograph</th><th>method</th><th>PSNR, dB</th><th>SSIM</th>"
+          "<th>PSNR inside</th><th>SSIM inside</th><th>hull's IoU</th></tr>\n";
+  for (const auto& [method, q] : e.mean.methods) add_row(page, "mean", e.mean.silhouette_iou, method, q);
+  for (const ViewEvaluation& v : e.views)
+    for (const auto& [method, q] : v.methods) add_row(page, v.name, v.silhouette_iou, method, q);
+  page += "</table></div>\n<p class=\"dim\">Below: photograph, rendering, four times their difference.</p>\n";
+  for (const ViewEvaluation& v : e.views)
+    for (const auto& [method, q] : v.methods) {
+      const fs::path file = capture.folder() / "evaluate" / (v.name + "." + method + ".png");
+      if (fs::exists(file))
+        page += figure(fitted(read_image(file, {.channels = 3}), kComparison), v.name + ", " + method);
+    }
+}
+
+void add_stages(std::string& page, const Capture& capture) {
+  page +=
+      "<h2>Stages</h2>\n<div class=\"scroll\"><table><tr><th>stage</th><th>time</th><th>peak memory</th>"
+      "<th>finished</th></tr>\n";
+  for (const auto& [name, record] : capture.stages)
+    page += "<tr><td>" + html_escaped(name) + "</td><td>" + formatted("%.1f s", record.seconds) + "</td><td>" +
+            megabytes(record.peak_bytes) + "</td><td>" + html_escaped(record.finished) + "</td></tr>\n";
+  page += "</table></div>\n";
+}
+
+}  // namespace
+
+void write_report(const Capture& capture, const ReportOptions& options, Job& job) {
+  if (options.turntable_frames < 0 || options.turntable_frames > 36)
+    throw Error(ErrorCode::invalid_argument, "turntable_frames: expected 0 to 36");
+  const fs::path folder = fs::absolute(capture.folder()).lexically_normal();
+  const std::string name = (folder.has_filename() ? folder : folder.parent_path()).filename().string();
+  const auto count_if = [&](auto&& is) {
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < capture.shots.size(); ++i) n += is(i);
+    return n;
+  };
+  const bool has_hull = fs::exists(capture.hull_path());
+  const fs::path model = capture.folder() / "textured.glb";
+  const bool has_model = fs::exists(model);
+
+  job.begin("report", std::min(capture.shots.size(), kSheetPhotos) + (has_hull ? 4u : 0u) +
+                          (has_model ? std::size_t(options.turntable_frames) : 0u));
+  std::string page =
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
+      "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>" +
+      html_escaped(name) + "</title><style>" + kStyle + "</style></head><body>\n<h1>" + html_escaped(name) +
+      "</h1>\n<p>" + std::to_string(capture.shots.size()) + " photographs, " +
+      std::to_string(count_if([&](std::size_t i) { return capture.positioned(i); })) + " positioned, " +
+      std::to_string(count_if([&](std::size_t i) { return capture.held_out(i); })) +
+      " held out; unit: " + (capture.unit == Unit::metres ? "metres" : "unknown") + ".</p>\n";
+  for (const std::string& note : capture.notes) page += "<p class=\"dim\">" + html_escaped(note) + "</p>\n";
+  if (has_model && options.turntable_frames > 0) add_model(page, capture, options.turntable_frames, model, job);
+  if (has_hull) add_hull(page, capture, job);
+  if (options.evaluation) add_evaluation(page, capture, *options.evaluation);
+  if (!capture.shots.empty()) add_photographs(page, capture, job);
+  if (!capture.stages.empty()) add_stages(page, capture);
+  page += "</body></html>\n";
+  write_file(options.file.empty() ? capture.folder() / "report.html" : options.file, page);
+  job.end();
+}
+
+}  // namespace lumihull::slf
