@@ -1,0 +1,29 @@
+#pragma once
+
+// What the opaque handles of lumihull.h are.
+
+#include <lumihull/base/capture.h>
+#include <lumihull/base/image.h>
+#include <lumihull/calib/color_key.h>
+#include <lumihull/hull/mesh.h>
+#include <lumihull/hull/ray_scene.h>
+
+struct lh_image {
+  lumihull::Image value;
+};
+
+struct lh_color_key {
+  lumihull::calib::ColorKey value;
+};
+
+struct lh_mesh {
+  lumihull::hull::Mesh value;
+};
+
+struct lh_ray_scene {
+  lumihull::hull::RayScene value;
+};
+
+struct lh_capture {
+  lumihull::Capture value;
+};
