@@ -92,6 +92,19 @@ void add_import(Program& program) {
       verb);
   masks->add_option("folder", a->files, "the folder of masks")->required()->expected(1);
   masks->add_option("--into", a->into, "the capture's folder")->required();
+
+  CLI::App* enclosure = program.verb(
+      "enclosure", "photographs of the empty enclosure, into a capture",
+      [&program, a] {
+        Capture capture = Capture::open(a->into);
+        const int n = import_enclosure(capture, a->paths(), a->reference, program.job());
+        program.say(a->into + ": " + std::to_string(n) + " photographs of the empty enclosure");
+        if (program.json) std::cout << slf::describe_json(capture) << "\n";
+      },
+      verb);
+  enclosure->add_option("files", a->files, "the photographs")->required();
+  enclosure->add_option("--into", a->into, "the capture's folder")->required();
+  enclosure->add_flag("--reference", a->reference, "refer to the photographs where they are instead of copying them");
 }
 
 }  // namespace lumihull::program

@@ -160,17 +160,6 @@ std::string clean_name(std::string name) {
   return name;
 }
 
-std::string unique_name(const fs::path& file, std::set<std::string>& taken) {
-  const std::string stem = clean_name(file.stem().string());
-  const std::string folder = clean_name(file.parent_path().filename().string());
-  std::string extension = file.extension().string();
-  if (!extension.empty()) extension[0] = '_';
-  for (const std::string& name : {stem, clean_name(folder + "_" + stem), clean_name(stem + extension)})
-    if (taken.insert(name).second) return name;
-  for (int i = 2;; ++i)
-    if (const std::string name = stem + "_" + std::to_string(i); taken.insert(name).second) return name;
-}
-
 /// The alpha channel as a mask; an empty picture where it is opaque everywhere.
 Image mask_from_alpha(const Image& photo) {
   const Image rgba = converted(photo, PixelType::u8, 4);
@@ -185,6 +174,17 @@ Image mask_from_alpha(const Image& photo) {
 }
 
 }  // namespace
+
+std::string unique_name(const fs::path& file, std::set<std::string>& taken) {
+  const std::string stem = clean_name(file.stem().string());
+  const std::string folder = clean_name(file.parent_path().filename().string());
+  std::string extension = file.extension().string();
+  if (!extension.empty()) extension[0] = '_';
+  for (const std::string& name : {stem, clean_name(folder + "_" + stem), clean_name(stem + extension)})
+    if (taken.insert(name).second) return name;
+  for (int i = 2;; ++i)
+    if (const std::string name = stem + "_" + std::to_string(i); taken.insert(name).second) return name;
+}
 
 Capture build_capture(Imported imported, const std::vector<ImageInfo>& infos, const ImportOptions& options, Job& job) {
   check_output(options.output);

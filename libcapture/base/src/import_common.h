@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -43,6 +44,9 @@ std::vector<ImageInfo> read_infos(const std::vector<std::filesystem::path>& file
 
 /// Throws invalid_argument where `output` is in use. Called first, so that no work is lost.
 void check_output(const std::filesystem::path& output);
+
+/// A photograph's stem, or its folder's name, extension or a number added until no other of `taken` has it.
+std::string unique_name(const std::filesystem::path& file, std::set<std::string>& taken);
 
 /// Writes the capture: `infos` belong to imported.photos.
 Capture build_capture(Imported imported, const std::vector<ImageInfo>& infos, const ImportOptions& options, Job& job);

@@ -81,4 +81,10 @@ LUMIHULL_API Capture import_photos(std::span<const std::filesystem::path> files,
 /// Errors: bad_input (a size that is not the photograph's, a colour picture), not_found (no picture fits any shot).
 LUMIHULL_API int import_masks(Capture& capture, const std::filesystem::path& folder, Job& job);
 
+/// Adds photographs of the empty enclosure to a capture, which keying then learns the background from. They are copied
+/// into enclosure/ unless `reference`; the capture is saved. Returns how many were added.
+/// Errors: invalid_argument (none named), not_found, bad_input (not a picture), io, cancelled.
+LUMIHULL_API int import_enclosure(Capture& capture, std::span<const std::filesystem::path> files, bool reference,
+                                  Job& job);
+
 }  // namespace lumihull
