@@ -1,0 +1,67 @@
+#pragma once
+
+#include <lumihull/base/image.h>
+#include <lumihull/hull/mesh.h>
+
+#include <Eigen/Core>
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace lumihull::rig {
+
+/// How the base colour varies over an object that has no texture picture; evaluated in 3-D, so no seams.
+enum class Pattern : std::uint8_t {
+  plain,    ///< colors[0]
+  checker,  ///< cubes of 1/10 of the object's size, colors[0] and [1]
+  stripes,  ///< wavy horizontal stripes of colors[0] and [1]
+  marble,   ///< colors[0] with veins of [1]
+  pottery,  ///< colors[0] with painted bands and zigzags of [1] and [2]
+};
+
+/// What a surface looks like. Colours are linear reflectances, 0 … 1.
+struct Material {
+  Pattern pattern = Pattern::plain;
+  std::array<Eigen::Vector3f, 3> colors{Eigen::Vector3f(.5f, .5f, .5f), Eigen::Vector3f(.1f, .1f, .1f),
+                                        Eigen::Vector3f(.05f, .05f, .05f)};
+  float grain = 0.15f;      ///< strength of fine noise on the colour, 0 … 1
+  float reflectance = .04f;  ///< mirror reflectance at normal incidence; 0: matt, .04: glaze, .6: metal
+  float roughness = .25f;   ///< GGX: alpha = roughness²; 0.05 … 1
+};
+
+/// A thing to be photographed. z is up; it stands on z = 0, its axis through the origin; metres.
+struct Object {
+  std::string name;
+  hull::Mesh mesh;
+  std::vector<Eigen::Vector3f> normals;                  ///< one a vertex; empty: from the mesh, with creases at 35°
+  std::vector<std::array<Eigen::Vector2f, 3>> uv;        ///< one a triangle's corner, v upwards; empty: no texture
+  Image texture;                                         ///< 8-bit sRGB, 3 channels, or empty: `material.pattern`
+  Material material;
+};
+
+/// Objects made by formula, `size` metres along the longest side of their box, `detail` cells along it.
+/// vase: surface of revolution with ridges, hollow neck, handle (genus 1). bust: a glossy, nearly convex head.
+/// statue: a dark figure with its arms akimbo (genus 2). box: twelve triangles, checker. sphere: radius size / 2, vertices
+/// on it to float accuracy, 20 * 4^n triangles.
+Object make_vase(double size, int detail = 100);
+Object make_bust(double size, int detail = 100);
+Object make_statue(double size, int detail = 130);
+Object make_box(double size);
+Object make_sphere(double size, int subdivisions = 6);
+
+/// Reads a mesh (PLY, OBJ), makes it stand on z = 0 (`y_up`: the file's y axis is up) and scales it to `size` metres.
+/// An OBJ file's texture coordinates are read where a `texture` picture is given.
+/// Errors: those of hull::read_mesh and read_image; bad_input naming file and line where texture coordinates are
+/// missing, not finite or indices are out of range.
+Object read_object(const std::filesystem::path& mesh, const std::filesystem::path& texture, double size, bool y_up);
+
+/// By name ("vase", "bust", "statue", "box", "sphere") or a mesh file (y up for OBJ, z up for PLY; a PNG of the same
+/// name beside an OBJ is its texture). Error{invalid_argument} for a name that is neither.
+Object object_by_name(const std::string& name, double size);
+
+/// The object's bounding box in its mesh: {low, high}; undefined for an empty mesh.
+std::array<Eigen::Vector3f, 2> bounding_box(const hull::Mesh& mesh);
+
+}  // namespace lumihull::rig

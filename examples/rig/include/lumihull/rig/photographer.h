@@ -1,0 +1,58 @@
+#pragma once
+
+#include <lumihull/base/camera.h>
+#include <lumihull/base/image.h>
+#include <lumihull/base/job.h>
+#include <lumihull/rig/scene.h>
+
+#include <cstdint>
+#include <memory>
+
+namespace lumihull::rig {
+
+/// How finely the light that does not depend on the camera is computed, once a scene.
+struct LightOptions {
+  int ambient_rays = 64;      ///< a vertex or texel
+  int lamp_rays = 12;         ///< a vertex or texel, for each lamp
+  int floor_texels = 160;     ///< along a side of the floor's light map; walls have a fifth of it
+  float vertex_spacing = .01f;  ///< triangles are split until their edges are shorter than this part of the object's size
+};
+
+/// What happens between the lens and the file.
+struct PhotoOptions {
+  int rays = 2;               ///< rays x rays a pixel …
+  int edge_rays = 6;          ///< … and so many where the first ones disagree: outlines
+  double exposure = 1;        ///< radiance 1 / exposure is white
+  double full_well = 25000;   ///< electrons at white: shot noise. 0: none
+  double read_noise = 9;      ///< electrons
+  bool depth = false;         ///< fill Photo::depth
+  int reduce = 1;             ///< > 1: light is traced at 1/reduce of the size and enlarged bicubically; noise at full size
+};
+
+/// A photograph and the truth about it.
+struct Photo {
+  Image picture;              ///< 8-bit sRGB, 3 channels
+  Image mask;                 ///< 8-bit, 1 channel: the part of the pixel that objects cover, 255 = all
+  Image depth;                ///< f32, 1 channel: z in the camera's frame at the pixel's centre, m; 0: no object. Or empty
+};
+
+/// Takes photographs of a scene. Light that does not depend on the camera (lamps with soft shadows, light from the
+/// painted room) is computed once, at construction; highlights and reflections for each photograph.
+/// Immutable after construction: any number of threads may take photographs.
+class Photographer {
+ public:
+  /// Errors: invalid_argument (a room without extent), bad_input (an object's mesh).
+  Photographer(const Scene& scene, const LightOptions& options, Job& job);
+  Photographer(Photographer&&) noexcept;
+  ~Photographer();
+
+  /// The photograph is a function of scene, view, options and seed (which makes the noise), whatever the threads.
+  /// Errors: invalid_argument (camera outside the enclosure, options out of range).
+  Photo photograph(const View& view, const PhotoOptions& options, std::uint64_t seed, Job& job) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace lumihull::rig

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <lumihull/rig/object.h>
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <vector>
+
+namespace lumihull::rig {
+
+/// A lamp with the shape of a sphere, fixed to the room.
+struct Lamp {
+  Eigen::Vector3f position{0, 0, 3};               ///< m
+  float radius = .15f;                             ///< m; softens shadows and highlights
+  Eigen::Vector3f intensity{1, 1, 1};              ///< a white surface at distance d, facing it, has radiance intensity / d²
+};
+
+/// The room around the object: a prism of painted panels (paper, section 3.2: "many shades of green"), a painted floor,
+/// and a white ceiling that glows and that no photograph should see.
+struct Enclosure {
+  int panels = 8;                                  ///< >= 3
+  float radius = 3;                                ///< m, axis to panel
+  float height = 3.3f;                             ///< m
+  Eigen::Vector3f color{.035f, .26f, .05f};        ///< mean paint, linear
+  float unevenness = .22f;                         ///< spread of shade among panels and within one, 0 … 1
+  Eigen::Vector3f ceiling{.75f, .75f, .72f};       ///< radiance
+  float pedestal_radius = 0, pedestal_height = 0;  ///< m; 0: none. Round, painted like the rest
+  std::uint64_t seed = 1;                          ///< of the paint
+};
+
+inline const Eigen::Vector3f kGreenPaint{.035f, .26f, .05f};
+inline const Eigen::Vector3f kBluePaint{.025f, .07f, .36f};
+
+/// Everything that light falls on. Objects stand where their meshes are.
+struct Scene {
+  std::vector<Object> objects;
+  Enclosure enclosure;
+  std::vector<Lamp> lamps;
+  Eigen::Vector3f ambient{.20f, .24f, .20f};       ///< light that paint receives from everywhere (many bounces)
+
+  /// Centre and radius of a ball around all objects; (0,0,0) and 0 without objects.
+  Eigen::Vector3f center() const;
+  float radius() const;
+  /// The same room without the objects.
+  Scene emptied() const;
+};
+
+/// An object in a room made to its measure: radius ten times the object's (3 m for an object of 0.6 m), three lamps
+/// under the ceiling. With a pedestal the object is lifted on it.
+Scene make_scene(Object object, const Eigen::Vector3f& paint, bool pedestal, std::uint64_t seed);
+
+}  // namespace lumihull::rig

@@ -1,0 +1,89 @@
+// lumihull-rig: photographs an object with the virtual rig, with the truth beside.
+
+#include <lumihull/base/error.h>
+#include <lumihull/rig/rig_capture.h>
+
+#include <CLI/CLI.hpp>
+
+#include <csignal>
+#include <cstdio>
+#include <map>
+
+namespace rig = lumihull::rig;
+
+namespace {
+
+lumihull::Job* running = nullptr;
+
+void stop(int) {
+  if (running) running->cancel();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Photographs an object in a painted enclosure, with known cameras and the truth beside.");
+  std::string output;
+  rig::RigOptions options;
+  unsigned threads = 0;
+  bool plain = false, fast = false, no_distortion = false;
+  app.add_option("-o,--output", output, "folder to make; must be new or empty")->required();
+  app.add_option("--object", options.object, "vase, bust, statue, box, sphere, or a mesh file (.obj, .ply)")
+      ->capture_default_str();
+  app.add_option("--size", options.size_m, "longest side of the object, m")->capture_default_str();
+  app.add_option("--photos", options.photos, "photographs of the object")->capture_default_str();
+  app.add_option("--empty", options.empty_photos, "photographs of the empty enclosure")->capture_default_str();
+  app.add_option("--width", options.width, "of a photograph, px; the height is two thirds")->capture_default_str();
+  app.add_option("--path", options.path, "where the camera goes")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, rig::Path>{
+          {"hemisphere", rig::Path::hemisphere}, {"ring", rig::Path::ring}, {"random", rig::Path::random}}));
+  app.add_option("--fill", options.fill, "part of the picture's height that the object takes")->capture_default_str();
+  app.add_flag("--blue", options.blue, "a blue enclosure instead of a green one");
+  app.add_flag("--pedestal", options.pedestal, "the object stands on a pedestal");
+  app.add_flag("--no-distortion", no_distortion, "an ideal lens");
+  app.add_option("--format", options.format, "of the photographs")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, rig::PhotoFormat>{{"jpeg", rig::PhotoFormat::jpeg}, {"png", rig::PhotoFormat::png}}));
+  app.add_option("--quality", options.jpeg_quality, "of the JPEGs, 1 to 100")->capture_default_str();
+  app.add_option("--rays", options.photo.rays, "n x n rays a pixel")->capture_default_str();
+  app.add_option("--exposure", options.photo.exposure, "brightness")->capture_default_str();
+  app.add_option("--seed", options.seed, "of paint, noise and trajectory")->capture_default_str();
+  app.add_flag("--plain", plain, "plain files and P.txt instead of a capture folder; implies --no-distortion");
+  app.add_flag("--fast", fast, "trace a third of the size and enlarge; noise at full size");
+  app.add_option("--threads", threads, "0: one for each core")->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  options.distortion = !no_distortion && !plain;
+  if (fast) options.photo.reduce = 3;
+
+  lumihull::Job job(
+      [](const lumihull::Progress& p) {
+        const bool done = p.done == p.total;
+        std::fprintf(stderr, "\r%-36s %6llu / %llu", p.stage.c_str(), static_cast<unsigned long long>(p.done),
+                     static_cast<unsigned long long>(p.total));
+        if (p.eta_s >= 0 && !done) std::fprintf(stderr, "   %.0f s to go ", p.eta_s);
+        if (done) std::fprintf(stderr, "   %.1f s          \n", p.elapsed_s);
+      },
+      threads);
+  running = &job;
+  std::signal(SIGINT, stop);
+  std::signal(SIGTERM, stop);
+  int status = 0;
+  try {
+    if (plain)
+      rig::make_photographs(output, options, job);
+    else
+      rig::make_capture(output, options, job);
+  } catch (const lumihull::Error& e) {
+    std::fprintf(stderr, "\nlumihull-rig: %s\n", e.what());
+    status = e.code() == lumihull::ErrorCode::cancelled ? 130 : 1;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "\nlumihull-rig: %s\n", e.what());
+    status = 1;
+  }
+  running = nullptr;
+  return status;
+}

@@ -1,0 +1,72 @@
+#pragma once
+
+#include "room.h"
+
+#include <lumihull/base/job.h>
+#include <lumihull/hull/ray_scene.h>
+#include <lumihull/rig/photographer.h>
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace lumihull::rig {
+
+/// Values on a grid of nodes over [0, 1]², bilinear between them.
+struct LightMap {
+  int columns = 0, rows = 0;  ///< >= 2
+  std::vector<Eigen::Vector3f> values;
+
+  Eigen::Vector3f at(float u, float v) const;
+};
+
+/// A scene together with the light that does not depend on where the camera is. "Light" of a place is what a white
+/// diffuse surface there would radiate.
+class LitScene {
+ public:
+  LitScene(const Scene& scene, const LightOptions& options, Job& job);
+
+  const Room& room() const { return room_; }
+  /// First object along each ray; all misses in an empty room.
+  void hit(std::span<const hull::Ray> rays, std::span<hull::Hit> hits) const;
+  /// Index of the object that a triangle belongs to.
+  std::uint32_t object_of(std::uint32_t triangle) const { return object_of_[triangle]; }
+
+  Eigen::Vector3f object_radiance(const hull::Ray& ray, const hull::Hit& hit) const;
+  Eigen::Vector3f room_radiance(const RoomHit& hit) const;
+
+ private:
+  struct Part {
+    Material material;
+    std::uint32_t first_triangle = 0;
+    Eigen::Vector3f foot{0, 0, 0};
+    float size = 1;
+    std::vector<std::array<Eigen::Vector2f, 3>> uv;
+    Image texture;
+  };
+
+  void add(const Object& object, float vertex_spacing);
+  void light_room(const LightOptions& options, Job& job);
+  void light_objects(const LightOptions& options, Job& job);
+  Eigen::Vector3f lamps_at(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, int rays, std::uint64_t turn) const;
+  Eigen::Vector3f base_color(const Part& part, const hull::Hit& hit, const Eigen::Vector3f& point) const;
+  bool blocked(const Eigen::Vector3f& point, const Eigen::Vector3f& way) const;
+
+  Room room_;
+  std::vector<Lamp> lamps_;
+  Eigen::Vector3f ambient_;
+  Eigen::Vector3f center_;
+  float radius_ = 0;
+  float offset_ = 0;  ///< how far shadow rays start from a surface, m
+  hull::Mesh mesh_;   ///< all objects, vertices doubled along creases, triangles split to a light vertex spacing
+  std::vector<Eigen::Vector3f> normals_, light_;  ///< one a vertex of mesh_
+  std::vector<std::uint32_t> object_of_;
+  std::vector<Part> parts_;
+  std::optional<hull::RayScene> rays_;
+  float near_floor_ = 0;  ///< half side of the finer light map around the axis, m
+  LightMap floor_near_, floor_far_, pedestal_top_, pedestal_side_;
+  std::vector<LightMap> panels_;
+};
+
+}  // namespace lumihull::rig

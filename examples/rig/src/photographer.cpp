@@ -1,0 +1,204 @@
+#include <lumihull/rig/photographer.h>
+
+#include "develop.h"
+#include "lit_scene.h"
+#include "noise.h"
+
+#include <lumihull/base/error.h>
+#include <lumihull/base/parallel.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace lumihull::rig {
+
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+using hull::Hit;
+using hull::Ray;
+
+namespace {
+
+/// Directions in the world through the corners of one row of pixels; a corner that the lens can't see is NaN.
+std::vector<Vector3d> corner_rays(const View& view, int y) {
+  std::vector<Vector3d> rays(static_cast<std::size_t>(view.camera.width) + 1);
+  const Eigen::Matrix3d world_from_cam = view.cam_from_world.rotation.conjugate().toRotationMatrix();
+  for (std::size_t x = 0; x < rays.size(); ++x) {
+    const auto ray = view.camera.ray({double(x), double(y)});
+    rays[x] = ray ? Vector3d(world_from_cam * *ray) : Vector3d::Constant(NAN);
+  }
+  return rays;
+}
+
+/// The camera whose picture is 1/n of the size; its pixel (u, v) is place (n u, n v) of the full picture.
+Camera reduced(const Camera& camera, int n) {
+  Camera small = camera;
+  small.width = (camera.width + n - 1) / n;
+  small.height = (camera.height + n - 1) / n;
+  small.f /= n, small.skew /= n, small.u0 /= n, small.v0 /= n;
+  return small;
+}
+
+struct Exposure {
+  Image light, cover, depth;  ///< f32: 3, 1, 1 channels
+};
+
+/// Takes the pixels of a block of rows.
+class RowTracer {
+ public:
+  RowTracer(const LitScene& scene, const View& view, const PhotoOptions& options)
+      : scene_(scene), view_(view), options_(options), origin_(view.center().cast<float>()) {}
+
+  void row(int y, Exposure& out) {
+    const std::vector<Vector3d> top = corner_rays(view_, y), bottom = corner_rays(view_, y + 1);
+    const int n = options_.rays, width = view_.camera.width;
+    sample(top, bottom, 0, width, n, rays_, hits_);
+    float* light = out.light.row<float>(y);
+    float* cover = out.cover.row<float>(y);
+    for (int x = 0; x < width; ++x, light += 3) {
+      const std::size_t first = std::size_t(x) * std::size_t(n * n);
+      std::span<const Ray> rays(rays_.data() + first, std::size_t(n * n));
+      std::span<const Hit> hits(hits_.data() + first, std::size_t(n * n));
+      // Next to an outline the first samples may all miss it: the neighbours' nearest columns are asked, too.
+      const std::size_t before = x > 0 ? first - 1 : first, after = x + 1 < width ? first + std::size_t(n * n) : first;
+      bool smooth = true;
+      if (!alike(rays, hits) || bool(hits_[before]) != bool(hits[0]) || bool(hits_[after]) != bool(hits[0])) {
+        sample(top, bottom, x, x + 1, options_.edge_rays, edge_rays_, edge_hits_);
+        rays = edge_rays_;
+        hits = edge_hits_;
+        smooth = false;
+      }
+      const auto [color, part] = integrate(rays, hits, smooth);
+      for (int c = 0; c < 3; ++c) light[c] = color[c];
+      cover[x] = part;
+    }
+    if (options_.depth) {
+      sample(top, bottom, 0, width, 1, rays_, hits_);
+      float* depth = out.depth.row<float>(y);
+      const Vector3f forward = (view_.cam_from_world.rotation.conjugate() * Vector3d::UnitZ()).cast<float>();
+      for (int x = 0; x < width; ++x) {
+        const Hit& hit = hits_[std::size_t(x)];
+        depth[x] = hit ? hit.t * forward.dot(rays_[std::size_t(x)].direction) : 0;
+      }
+    }
+  }
+
+ private:
+  /// n x n rays for each of the pixels [x0, x1), a pixel's samples together, and what they meet.
+  /// Within a pixel directions are bilinear: the lens's curvature over one pixel is below 1e-6 px.
+  void sample(const std::vector<Vector3d>& top, const std::vector<Vector3d>& bottom, int x0, int x1, int n,
+              std::vector<Ray>& rays, std::vector<Hit>& hits) const {
+    rays.clear();
+    for (int x = x0; x < x1; ++x) {
+      const std::size_t i = std::size_t(x);
+      for (int b = 0; b < n; ++b)
+        for (int a = 0; a < n; ++a) {
+          const double u = (a + .5) / n, v = (b + .5) / n;
+          const Vector3d d = (1 - v) * ((1 - u) * top[i] + u * top[i + 1]) + v * ((1 - u) * bottom[i] + u * bottom[i + 1]);
+          Ray ray{origin_, d.cast<float>()};
+          if (!d.allFinite()) ray = {origin_, Vector3f::UnitZ(), 0, 0};  // sees nothing
+          rays.push_back(ray);
+        }
+    }
+    hits.resize(rays.size());
+    scene_.hit(rays, hits);
+  }
+
+  static bool unseen(const Ray& ray) { return ray.t_far == 0; }
+
+  /// Whether a pixel's samples show one smooth piece of one thing.
+  bool alike(std::span<const Ray> rays, std::span<const Hit> hits) {
+    const bool first = bool(hits[0]);
+    for (const Hit& hit : hits)
+      if (bool(hit) != first) return false;
+    if (first) {
+      float near = hits[0].t, far = near;
+      for (const Hit& hit : hits) near = std::min(near, hit.t), far = std::max(far, hit.t);
+      return far < 1.02f * near;
+    }
+    const int surface = scene_.room().hit(origin_, rays[0].direction).surface;
+    for (const Ray& ray : rays)
+      if (scene_.room().hit(origin_, ray.direction).surface != surface) return false;
+    return true;
+  }
+
+  /// Mean radiance and covered part. A pixel that is `smooth` and sees the room alone is worth one look at its middle.
+  std::pair<Vector3f, float> integrate(std::span<const Ray> rays, std::span<const Hit> hits, bool smooth) const {
+    Vector3f sum = Vector3f::Zero();
+    int covered = 0;
+    Vector3f middle = Vector3f::Zero();
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (hits[i]) {
+        sum += scene_.object_radiance(rays[i], hits[i]);
+        ++covered;
+      } else if (!unseen(rays[i])) {
+        if (smooth)
+          middle += rays[i].direction;
+        else
+          sum += scene_.room_radiance(scene_.room().hit(origin_, rays[i].direction));
+      }
+    }
+    const float n = float(rays.size());
+    if (smooth && covered == 0 && middle.squaredNorm() > 0)
+      return {scene_.room_radiance(scene_.room().hit(origin_, middle)), 0.f};
+    return {sum / n, float(covered) / n};
+  }
+
+  const LitScene& scene_;
+  const View& view_;
+  const PhotoOptions& options_;
+  Vector3f origin_;
+  std::vector<Ray> rays_, edge_rays_;
+  std::vector<Hit> hits_, edge_hits_;
+};
+
+void check(const PhotoOptions& o) {
+  const auto within = [](double x, double low, double high) { return x >= low && x <= high; };
+  if (!within(o.rays, 1, 64) || !within(o.edge_rays, 1, 64) || !within(o.exposure, 1e-6, 1e6) ||
+      !within(o.full_well, 0, 1e12) || !within(o.read_noise, 0, 1e9) || !within(o.reduce, 1, 64))
+    throw Error(ErrorCode::invalid_argument, "photo options are out of range", "rig");
+  if (o.depth && o.reduce > 1)
+    throw Error(ErrorCode::invalid_argument, "depth is known at full size only: reduce must be 1", "rig");
+}
+
+}  // namespace
+
+struct Photographer::Impl {
+  LitScene scene;
+};
+
+Photographer::Photographer(const Scene& scene, const LightOptions& options, Job& job)
+    : impl_(new Impl{LitScene(scene, options, job)}) {}
+Photographer::Photographer(Photographer&&) noexcept = default;
+Photographer::~Photographer() = default;
+
+Photo Photographer::photograph(const View& view, const PhotoOptions& options, std::uint64_t seed, Job& job) const {
+  check(options);
+  view.camera.validate();
+  if (!impl_->scene.room().contains(view.center().cast<float>()))
+    throw Error(ErrorCode::invalid_argument, "the camera stands outside the enclosure, or in its pedestal", "rig");
+  View small = view;
+  small.camera = reduced(view.camera, options.reduce);
+  const int width = small.camera.width, height = small.camera.height;
+  Exposure exposure{Image(width, height, 3, PixelType::f32), Image(width, height, 1, PixelType::f32), {}};
+  if (options.depth) exposure.depth = Image(width, height, 1, PixelType::f32);
+  parallel_chunks(job, std::size_t(height), 4, [&](std::size_t first, std::size_t last) {
+    RowTracer tracer(impl_->scene, small, options);
+    for (std::size_t y = first; y < last; ++y) tracer.row(int(y), exposure);
+  });
+  if (options.reduce > 1) {
+    const auto enlarged = [&](Image& image) {
+      if (!image.empty()) image = enlarge(image, options.reduce, view.camera.width, view.camera.height, job);
+    };
+    enlarged(exposure.light);
+    enlarged(exposure.cover);
+  }
+  Photo photo;
+  photo.picture = develop(exposure.light, options, mix(seed), job);
+  photo.mask = converted(exposure.cover, PixelType::u8, 1);
+  photo.depth = std::move(exposure.depth);
+  return photo;
+}
+
+}  // namespace lumihull::rig

@@ -1,0 +1,119 @@
+#include "room.h"
+
+#include "noise.h"
+
+#include <lumihull/base/error.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace lumihull::rig {
+
+using Eigen::Vector3f;
+
+Room::Room(const Enclosure& enclosure) : enclosure_(enclosure) {
+  const Enclosure& e = enclosure_;
+  const bool finite = std::isfinite(e.radius) && std::isfinite(e.height) && std::isfinite(e.pedestal_radius) &&
+                      std::isfinite(e.pedestal_height) && e.color.allFinite();
+  if (!finite || e.radius <= 0 || e.height <= 0 || e.panels < 3 || e.panels > 1000 || e.pedestal_radius < 0 ||
+      e.pedestal_radius >= e.radius || e.pedestal_height < 0 || e.pedestal_height >= e.height)
+    throw Error(ErrorCode::invalid_argument, "the enclosure needs a positive size and 3 to 1000 panels", "enclosure");
+  for (int i = 0; i < e.panels; ++i) {
+    const float angle = 6.2831853f * (float(i) + .5f) / float(e.panels);
+    normals_.emplace_back(-std::cos(angle), -std::sin(angle), 0.f);
+  }
+  for (int i = 0; i < surfaces(); ++i) {
+    const auto random = [&](int k) { return 2 * unit_float(mix(e.seed, std::uint64_t(i * 4 + k))) - 1; };
+    const float bright = 1 + .6f * e.unevenness * random(0);
+    // Hue wanders less than brightness: different spray cans of one colour.
+    shades_.push_back(bright * (Vector3f::Ones() + .35f * e.unevenness * Vector3f(random(1), random(2), random(3))));
+  }
+}
+
+bool Room::contains(const Vector3f& p) const {
+  if (!(p.z() > 0 && p.z() < enclosure_.height)) return false;
+  for (const Vector3f& n : normals_)
+    if (!(n.dot(p) > -enclosure_.radius)) return false;
+  return !(p.z() <= enclosure_.pedestal_height && p.head<2>().norm() <= enclosure_.pedestal_radius);
+}
+
+bool Room::pedestal_hit(const Vector3f& o, const Vector3f& d, RoomHit& out) const {
+  const float r = enclosure_.pedestal_radius, h = enclosure_.pedestal_height;
+  if (r <= 0 || h <= 0) return false;
+  bool found = false;
+  if (d.z() < 0 && o.z() > h) {
+    const float t = (h - o.z()) / d.z();
+    const Vector3f p = o + t * d;
+    if (p.head<2>().squaredNorm() < r * r) out = {kPedestalTop, t, p, Vector3f::UnitZ()}, found = true;
+  }
+  const float a = d.head<2>().squaredNorm(), b = o.head<2>().dot(d.head<2>()), c = o.head<2>().squaredNorm() - r * r;
+  const float discriminant = b * b - a * c;
+  if (!found && a > 0 && discriminant > 0 && c > 0) {
+    const float t = (-b - std::sqrt(discriminant)) / a;
+    const Vector3f p = o + t * d;
+    if (t > 0 && p.z() < h && p.z() > 0)
+      out = {kPedestalSide, t, p, Vector3f(p.x() / r, p.y() / r, 0)}, found = true;
+  }
+  return found;
+}
+
+bool Room::pedestal_between(const Vector3f& o, const Vector3f& d) const {
+  RoomHit hit;
+  return pedestal_hit(o, d, hit) && hit.t < 1;
+}
+
+RoomHit Room::hit(const Vector3f& o, const Vector3f& d) const {
+  RoomHit out;
+  if (pedestal_hit(o, d, out)) return out;
+  out.t = INFINITY;
+  const auto meet = [&](int surface, float t, const Vector3f& normal) {
+    out.surface = surface, out.t = t, out.normal = normal;
+  };
+  if (d.z() < 0) meet(kFloor, -o.z() / d.z(), Vector3f::UnitZ());
+  if (d.z() > 0) meet(kCeiling, (enclosure_.height - o.z()) / d.z(), -Vector3f::UnitZ());
+  for (int i = 0; i < enclosure_.panels; ++i) {
+    const Vector3f& n = normals_[std::size_t(i)];
+    const float towards = -n.dot(d);
+    if (towards <= 0) continue;
+    const float t = (enclosure_.radius + n.dot(o)) / towards;
+    if (t < out.t) meet(kPanels + i, t, n);
+  }
+  out.point = o + out.t * d;
+  return out;
+}
+
+Vector3f Room::paint(const RoomHit& at) const {
+  const Enclosure& e = enclosure_;
+  if (at.surface == kCeiling) return Vector3f::Zero();
+  const Vector3f q = at.point / e.radius;
+  const std::uint64_t seed = mix(e.seed, std::uint64_t(at.surface));
+  const float clouds = fractal_noise(q * 2.3f, 3, seed);
+  const float grain = value_noise(q * 260, seed + 17);
+  float shade = 1 + e.unevenness * (.75f * clouds + .10f * grain);
+  if (at.surface >= kPanels) {
+    // Narrow shadows where panels meet, and a worn strip above the floor.
+    const Vector3f& n = at.normal;
+    const float across = std::fabs(-n.y() * at.point.x() + n.x() * at.point.y());
+    const float half = e.radius * std::tan(3.1415927f / float(e.panels));
+    shade *= 1 - .55f * (1 - smoothstep(.001f, .004f, (half - across) / e.radius));
+    shade *= 1 - .12f * (1 - smoothstep(0.f, .10f, q.z()));
+  }
+  // Thin paint lets a little more yellow through.
+  const Vector3f hue(1 + .25f * clouds * e.unevenness / .22f, 1.f, 1 - .12f * clouds * e.unevenness / .22f);
+  return (e.color.cwiseProduct(shades_[std::size_t(at.surface)]).cwiseProduct(hue) * shade).cwiseMax(0.f).cwiseMin(1.f);
+}
+
+float Room::edge_shade(const RoomHit& at) const {
+  const Enclosure& e = enclosure_;
+  const auto corner = [&](float distance) { return 1 - .45f * std::exp(-distance / (.10f * e.radius)); };
+  float shade = 1;
+  if (at.surface == kFloor) {
+    for (const Vector3f& n : normals_) shade *= corner(e.radius + n.dot(at.point));
+    if (e.pedestal_height > 0) shade *= corner(2 * std::max(0.f, at.point.head<2>().norm() - e.pedestal_radius));
+  } else if (at.surface >= kPanels || at.surface == kPedestalSide) {
+    shade *= corner(at.point.z());
+  }
+  return shade;
+}
+
+}  // namespace lumihull::rig

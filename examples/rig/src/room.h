@@ -1,0 +1,51 @@
+#pragma once
+
+#include <lumihull/rig/scene.h>
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cstdint>
+
+namespace lumihull::rig {
+
+/// Where a ray meets the room.
+struct RoomHit {
+  int surface = 0;  ///< 0 floor, 1 ceiling, 2 pedestal's top, 3 its side, 4 … panels
+  float t = 0;
+  Eigen::Vector3f point{0, 0, 0}, normal{0, 0, 1};  ///< normal towards the inside
+};
+
+/// The enclosure as a solid that rays can ask; no light yet. Convex but for the pedestal, so all is analytic.
+class Room {
+ public:
+  static constexpr int kFloor = 0, kCeiling = 1, kPedestalTop = 2, kPedestalSide = 3, kPanels = 4;
+
+  /// Error{invalid_argument} for a room without extent.
+  explicit Room(const Enclosure& enclosure);
+
+  const Enclosure& enclosure() const { return enclosure_; }
+  int surfaces() const { return kPanels + enclosure_.panels; }
+  bool contains(const Eigen::Vector3f& point) const;
+
+  /// From a point inside; direction of any length.
+  RoomHit hit(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
+  /// Whether the pedestal stands between origin and origin + direction.
+  bool pedestal_between(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
+
+  /// The paint's linear reflectance at a place: shades of panels, clouds, brush grain, seams.
+  Eigen::Vector3f paint(const RoomHit& at) const;
+  /// How much less of the room's diffuse light reaches a place near an edge where two surfaces meet, 0.55 … 1.
+  float edge_shade(const RoomHit& at) const;
+  /// Normal of panel i, towards the axis.
+  const Eigen::Vector3f& panel_normal(int i) const { return normals_[std::size_t(i)]; }
+
+ private:
+  bool pedestal_hit(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, RoomHit& out) const;
+
+  Enclosure enclosure_;
+  std::vector<Eigen::Vector3f> normals_;
+  std::vector<Eigen::Vector3f> shades_;  ///< one a surface: factor on the paint
+};
+
+}  // namespace lumihull::rig

@@ -1,0 +1,215 @@
+// The objects that are made by formula. Each is a smooth union of simple bodies in a frame where the object is about one
+// unit high, stands on z = 0 and looks towards -y.
+
+#include "noise.h"
+#include "polygonize.h"
+
+#include <lumihull/base/error.h>
+#include <lumihull/rig/object.h>
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace lumihull::rig {
+
+namespace {
+
+using Eigen::Vector3f;
+
+/// Smooth minimum: a union with a fillet of about k (Quilez, polynomial form).
+float blend(float a, float b, float k) {
+  const float h = std::fmax(k - std::fabs(a - b), 0.f) / k;
+  return std::fmin(a, b) - h * h * k * 0.25f;
+}
+float cut(float a, float b, float k) { return -blend(-a, -b, k); }  // smooth maximum: an intersection
+
+float ellipsoid(const Vector3f& p, const Vector3f& c, const Vector3f& r) {
+  const Vector3f q = p - c;
+  const float k0 = q.cwiseQuotient(r).norm(), k1 = q.cwiseQuotient(r.cwiseProduct(r)).norm();
+  return k1 > 0 ? k0 * (k0 - 1) / k1 : -r.minCoeff();
+}
+
+float capsule(const Vector3f& p, const Vector3f& a, const Vector3f& b, float ra, float rb) {
+  const Vector3f ab = b - a;
+  const float t = std::clamp((p - a).dot(ab) / ab.squaredNorm(), 0.f, 1.f);
+  return (p - a - t * ab).norm() - (ra + t * (rb - ra));
+}
+
+float vase_radius(float z) {
+  static constexpr float kProfile[][2] = {{-.1f, .19f}, {0, .19f},    {.05f, .165f}, {.18f, .27f}, {.40f, .335f},
+                                          {.60f, .28f}, {.76f, .15f}, {.87f, .135f}, {.96f, .185f}, {1.05f, .21f},
+                                          {1.2f, .21f}};
+  std::size_t i = 1;
+  while (i + 3 < std::size(kProfile) && z > kProfile[i + 1][0]) ++i;
+  // Cubic Hermite with finite-difference slopes.
+  const auto slope = [&](std::size_t k) {
+    return (kProfile[k + 1][1] - kProfile[k - 1][1]) / (kProfile[k + 1][0] - kProfile[k - 1][0]);
+  };
+  const float h = kProfile[i + 1][0] - kProfile[i][0], t = std::clamp((z - kProfile[i][0]) / h, 0.f, 1.f);
+  const float t2 = t * t, t3 = t2 * t;
+  return (2 * t3 - 3 * t2 + 1) * kProfile[i][1] + (t3 - 2 * t2 + t) * h * slope(i) +
+         (3 * t2 - 2 * t3) * kProfile[i + 1][1] + (t3 - t2) * h * slope(i + 1);
+}
+
+float vase(const Vector3f& p) {
+  const float r = std::hypot(p.x(), p.y()), theta = std::atan2(p.y(), p.x()), z = p.z();
+  const float profile = vase_radius(z);
+  const float belly = smoothstep(.12f, .26f, z) * (1 - smoothstep(.50f, .64f, z));
+  const float ridges = .010f * std::cos(18 * theta) * belly + .004f * std::cos(95 * z) * smoothstep(.66f, .74f, z);
+  float d = .75f * (r - profile - ridges);
+  d = cut(d, z - 1, .02f);
+  d = cut(d, -z, .02f);
+  // The hollow neck: the hull can't see into it, as in life.
+  const float hollow = cut(.75f * (r - profile + .03f), .80f - z, .03f);
+  d = cut(d, -hollow, .012f);
+  // The handle: an elliptic ring in the plane y = 0, half of it inside the body.
+  const float ex = (p.x() - .27f) / .17f, ez = (z - .655f) / .20f;
+  const float m = std::hypot(ex, ez);
+  const float ring = m > 1e-6f ? (m - 1) * std::hypot(ex * .17f, ez * .20f) / m : -.17f;
+  const float handle = std::hypot(ring, p.y() * .8f) - .027f;
+  return blend(d, cut(handle, -(r - profile + .05f), .01f), .03f);
+}
+
+float bust(const Vector3f& p) {
+  const Vector3f q(std::fabs(p.x()), p.y(), p.z());  // both halves are alike
+  float d = ellipsoid(p, {0, .02f, .10f}, {.335f, .19f, .17f});
+  d = blend(d, ellipsoid(p, {0, -.07f, .12f}, {.20f, .14f, .15f}), .06f);
+  d = blend(d, capsule(p, {0, .03f, .15f}, {0, .005f, .50f}, .105f, .088f), .09f);
+  d = blend(d, ellipsoid(p, {0, .01f, .74f}, {.172f, .205f, .225f}), .06f);      // skull
+  d = blend(d, ellipsoid(p, {0, -.075f, .60f}, {.115f, .115f, .14f}), .06f);    // jaw
+  d = blend(d, ellipsoid(p, {0, -.175f, .515f}, {.045f, .035f, .035f}), .04f);  // chin
+  d = blend(d, capsule(p, {0, -.185f, .72f}, {0, -.245f, .645f}, .018f, .030f), .035f);  // nose
+  d = blend(d, ellipsoid(q, {.07f, -.165f, .745f}, {.06f, .03f, .022f}), .03f);  // brows
+  d = cut(d, -ellipsoid(q, {.075f, -.205f, .70f}, {.04f, .03f, .028f}), .03f);   // eye sockets
+  d = blend(d, ellipsoid(q, {.07f, -.165f, .70f}, {.026f, .022f, .022f}), .01f);
+  d = blend(d, ellipsoid(p, {0, -.195f, .583f}, {.05f, .022f, .013f}), .018f);  // lips
+  d = blend(d, ellipsoid(p, {0, -.190f, .560f}, {.043f, .022f, .013f}), .018f);
+  d = blend(d, ellipsoid(q, {.175f, .02f, .68f}, {.022f, .045f, .065f}), .02f);  // ears
+  d = blend(d, ellipsoid(p, {0, .20f, .83f}, {.085f, .075f, .085f}), .03f);     // a knot of hair
+  d += .006f * std::sin(60 * (p.z() + .35f * p.y())) * smoothstep(.80f, .86f, p.z() + .25f * p.y());
+  return cut(d, -p.z(), .015f);
+}
+
+float statue(const Vector3f& p) {
+  const Vector3f q(std::fabs(p.x()), p.y(), p.z());
+  float d = std::fmax(std::hypot(p.x(), p.y()) - .20f, std::fabs(p.z() - .03f) - .03f);      // plinth
+  d = blend(d, capsule(q, {.085f, 0, .06f}, {.055f, .01f, .46f}, .043f, .062f), .03f);       // legs
+  d = blend(d, ellipsoid(q, {.085f, -.05f, .075f}, {.038f, .075f, .03f}), .02f);             // feet
+  d = blend(d, ellipsoid(p, {0, .01f, .48f}, {.105f, .075f, .075f}), .04f);                  // hips
+  d = blend(d, capsule(p, {0, 0, .50f}, {0, -.005f, .70f}, .075f, .085f), .05f);             // trunk
+  d = blend(d, ellipsoid(p, {0, 0, .735f}, {.145f, .065f, .05f}), .05f);                     // shoulders
+  d = blend(d, capsule(q, {.14f, 0, .74f}, {.265f, .03f, .615f}, .036f, .030f), .03f);       // upper arms
+  d = blend(d, capsule(q, {.265f, .03f, .615f}, {.10f, -.02f, .50f}, .030f, .026f), .02f);   // forearms to the hips
+  d = blend(d, capsule(p, {0, 0, .76f}, {0, -.005f, .84f}, .038f, .036f), .03f);             // neck
+  d = blend(d, ellipsoid(p, {0, -.01f, .905f}, {.068f, .080f, .095f}), .02f);                // head
+  d = blend(d, ellipsoid(p, {0, .0f, .965f}, {.10f, .10f, .016f}), .01f);                    // hat
+  return cut(d, -p.z(), .01f);
+}
+
+Object from_formula(const char* name, float (*formula)(const Vector3f&), const Vector3f& low, const Vector3f& high,
+                    double size, int detail) {
+  if (detail < 8 || detail > 1000)
+    throw Error(ErrorCode::invalid_argument, "detail must be from 8 to 1000 cells", name);
+  Polygons polygons = polygonize(formula, low, high, 1.f / float(detail));
+  Object object;
+  object.name = name;
+  object.mesh = std::move(polygons.mesh);
+  object.normals = std::move(polygons.normals);
+  const auto [a, b] = bounding_box(object.mesh);
+  const float scale = float(size) / (b - a).maxCoeff();
+  for (Vector3f& v : object.mesh.vertices) v = Vector3f(v.x(), v.y(), v.z() - a.z()) * scale;
+  return object;
+}
+
+}  // namespace
+
+std::array<Vector3f, 2> bounding_box(const hull::Mesh& mesh) {
+  std::array<Vector3f, 2> box{Vector3f::Constant(INFINITY), Vector3f::Constant(-INFINITY)};
+  for (const Vector3f& v : mesh.vertices) box = {box[0].cwiseMin(v), box[1].cwiseMax(v)};
+  return box;
+}
+
+Object make_vase(double size, int detail) {
+  Object object = from_formula("vase", vase, {-.42f, -.42f, -.05f}, {.54f, .42f, 1.06f}, size, detail);
+  object.material = {Pattern::pottery, {{{.62f, .25f, .10f}, {.020f, .035f, .11f}, {.80f, .68f, .45f}}}, .2f, .045f, .30f};
+  return object;
+}
+
+Object make_bust(double size, int detail) {
+  Object object = from_formula("bust", bust, {-.45f, -.38f, -.05f}, {.45f, .40f, 1.06f}, size, detail);
+  object.material = {Pattern::marble, {{{.72f, .62f, .50f}, {.30f, .16f, .10f}, {}}}, .1f, .06f, .22f};
+  return object;
+}
+
+Object make_statue(double size, int detail) {
+  Object object = from_formula("statue", statue, {-.36f, -.28f, -.05f}, {.36f, .28f, 1.06f}, size, detail);
+  object.material = {Pattern::marble, {{{.055f, .04f, .035f}, {.11f, .075f, .03f}, {}}}, .3f, .10f, .35f};
+  return object;
+}
+
+Object make_box(double size) {
+  Object object;
+  object.name = "box";
+  const float h = float(size) / 2;
+  for (int c = 0; c < 8; ++c)
+    object.mesh.vertices.emplace_back(c & 1 ? h : -h, c & 2 ? .8f * h : -.8f * h, c & 4 ? 1.2f * h : 0);
+  object.mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                           {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  object.material = {Pattern::checker, {{{.75f, .72f, .65f}, {.45f, .04f, .03f}, {}}}, .15f, .04f, .4f};
+  return object;
+}
+
+Object make_sphere(double size, int subdivisions) {
+  if (subdivisions < 0 || subdivisions > 8)
+    throw Error(ErrorCode::invalid_argument, "subdivisions must be from 0 to 8", "sphere");
+  // An icosahedron whose triangles are split in four and pushed out.
+  std::vector<Eigen::Vector3d> points;
+  const double g = (1 + std::sqrt(5.0)) / 2;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int s = 0; s < 4; ++s) {
+      Eigen::Vector3d p = Eigen::Vector3d::Zero();
+      p[axis] = s & 1 ? 1 : -1;
+      p[(axis + 1) % 3] = s & 2 ? g : -g;
+      points.push_back(p.normalized());
+    }
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  const double edge = 2 / std::hypot(1, g);
+  for (std::uint32_t a = 0; a < 12; ++a)
+    for (std::uint32_t b = a + 1; b < 12; ++b)
+      for (std::uint32_t c = b + 1; c < 12; ++c) {
+        const auto near = [&](std::uint32_t i, std::uint32_t j) { return (points[i] - points[j]).norm() < edge * 1.01; };
+        if (!near(a, b) || !near(b, c) || !near(a, c)) continue;
+        const bool outwards = (points[b] - points[a]).cross(points[c] - points[a]).dot(points[a]) > 0;
+        triangles.push_back(outwards ? std::array{a, b, c} : std::array{a, c, b});
+      }
+  for (int level = 0; level < subdivisions; ++level) {
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middle_of;
+    const auto middle = [&](std::uint32_t a, std::uint32_t b) {
+      const auto [it, added] = middle_of.try_emplace(std::minmax(a, b), std::uint32_t(points.size()));
+      if (added) points.push_back((points[a] + points[b]).normalized());
+      return it->second;
+    };
+    std::vector<std::array<std::uint32_t, 3>> finer;
+    finer.reserve(triangles.size() * 4);
+    for (const auto& [a, b, c] : triangles) {
+      const std::uint32_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+      finer.insert(finer.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+    }
+    triangles = std::move(finer);
+  }
+  Object object;
+  object.name = "sphere";
+  object.mesh.triangles = std::move(triangles);
+  const double radius = size / 2;
+  for (const Eigen::Vector3d& p : points) {
+    object.mesh.vertices.push_back((p * radius + Eigen::Vector3d(0, 0, radius)).cast<float>());
+    object.normals.push_back(p.cast<float>());
+  }
+  object.material = {Pattern::stripes, {{{.70f, .20f, .07f}, {.75f, .65f, .40f}, {}}}, .15f, .04f, .2f};
+  return object;
+}
+
+}  // namespace lumihull::rig
