@@ -267,6 +267,38 @@ LH_API lh_status lh_mesh_normals(lh_context *ctx, const lh_mesh *mesh, float *ou
 /** Volume that a closed mesh encloses, in cubic units; positive where its triangles are oriented outwards. */
 LH_API lh_status lh_mesh_volume(lh_context *ctx, const lh_mesh *mesh, double *out);
 
+/* ---- visual hull ------------------------------------------------------------------------------------------------- */
+
+typedef struct lh_carve_options {
+  size_t struct_size;
+  int32_t resolution;         /**< cubic voxels along the longest side of the region, 8 … 2048; 0: 256 */
+  int32_t has_region;         /**< no: the region is found from cameras and masks */
+  double region[6];           /**< x, y, z of the least corner, then of the greatest */
+  int32_t tolerance;          /**< a point is carved only where so many views say so; 0: 1, the visual hull */
+  int32_t min_views;          /**< a point that fewer views see is no object; 0: 1 */
+  double min_component;       /**< parts below this share of the largest part's volume go; 0: 0.01; negative: all stay */
+  const double *cut_planes;   /**< n x 4, (normal, offset): what lies at normal · x > offset is cut away */
+  size_t cut_plane_count;     /**< n */
+  const double *cut_boxes;    /**< n x 6, like region: what lies within is cut away */
+  size_t cut_box_count;       /**< n */
+} lh_carve_options;
+
+/**
+ * The visual hull of silhouettes: what is left of space when everything that a camera sees as background is taken away.
+ *
+ * @param n              views, 1 … 1,000,000
+ * @param cameras        n, each with the same struct_size, which is also the distance from one to the next
+ * @param cam_from_world n x 12
+ * @param masks          n pointers, each to height x width bytes of its camera: 255 = object, 0 = background; values
+ *                       between say how much of a pixel is object, the contour runs at 127.5
+ * @param out            a closed mesh
+ * @return LH_EDEGENERATE: no bounded region is common to the views, the hull vanishes (the message names the views that
+ *         carve everything away), a camera is inside the object; LH_ECANCELLED
+ * Source: Laurentini 1994.
+ */
+LH_API lh_status lh_hull_carve(lh_context *ctx, size_t n, const lh_camera *cameras, const double *cam_from_world,
+                               const uint8_t *const *masks, const lh_carve_options *options, lh_mesh **out);
+
 /* ---- rays -------------------------------------------------------------------------------------------------------- */
 
 /** A mesh made ready for ray casting. */
@@ -340,6 +372,8 @@ LH_API lh_status lh_capture_shot_camera(lh_context *ctx, const lh_capture *captu
 LH_API lh_status lh_capture_shot_held_out(lh_context *ctx, const lh_capture *capture, size_t shot, int32_t *held_out);
 /** Every nth shot (the first, the n+1st, …) is held out; 0: none. */
 LH_API lh_status lh_capture_set_hold_out(lh_context *ctx, lh_capture *capture, int32_t n);
+/** What pictures are composited on when they are judged, 8-bit sRGB; keying sets it where it is not set. */
+LH_API lh_status lh_capture_set_background(lh_context *ctx, lh_capture *capture, const uint8_t rgb[3]);
 /** @return LH_ENOTFOUND: the shot is not positioned */
 LH_API lh_status lh_capture_get_pose(lh_context *ctx, const lh_capture *capture, size_t shot, double cam_from_world[12]);
 /** cam_from_world: NULL takes the pose away. */
@@ -393,6 +427,113 @@ LH_API lh_status lh_capture_run_stage(lh_context *ctx, lh_capture *capture, cons
                                       lh_stage_fn fn, void *user);
 /** All the stages that exist and are needed, in order; fn is called for each that was done or skipped. */
 LH_API lh_status lh_capture_run(lh_context *ctx, lh_capture *capture, int32_t force, lh_stage_fn fn, void *user);
+
+/** evaluate/evaluation.json, which the stage "evaluate" leaves: means over the held-out photographs, and each one's values.
+ *  @return LH_ENOTFOUND: the stage has not been run */
+LH_API lh_status lh_capture_evaluation(lh_context *ctx, const lh_capture *capture, char *buffer, size_t size,
+                                       size_t *needed);
+
+/* ---- import, export ---------------------------------------------------------------------------------------------- */
+
+typedef struct lh_import_options {
+  size_t struct_size;
+  int32_t reference;         /**< yes: refer to photographs where they are instead of copying them */
+  double pixel_shift;        /**< projections: added to their pixels so that the first one's centre becomes 0.5: 0 where it is
+                                  already, 0.5 where the matrices say 0 (OpenCV), -0.5 where they say 1 (MATLAB) */
+  double max_refit_error_px; /**< NeRF, COLMAP: lenses of other models are refitted; the largest error allowed; 0: 0.5 */
+} lh_import_options;
+
+/*
+ * Importers make a new capture in `folder`, which does not exist yet or is empty. A failed or cancelled import leaves no
+ * half of one. What they had to decide (a mirrored world, refitted lenses) stands under "notes" in lh_capture_describe.
+ * All: LH_EINVAL: the folder is in use; LH_ENOTFOUND, LH_EINPUT: names the file, line or JSON pointer; LH_ECANCELLED.
+ */
+
+/** "NAME p11 p12 … p34" a line, any scale, sign and handedness; names relative to the listing.
+ *  @return LH_EDEGENERATE: all rays parallel, so that handedness can't be told */
+LH_API lh_status lh_capture_import_projections(lh_context *ctx, const char *listing, const char *folder,
+                                               const lh_import_options *options, lh_capture **out);
+/** A Middlebury multi-view file, *_par.txt. */
+LH_API lh_status lh_capture_import_middlebury(lh_context *ctx, const char *file, const char *folder,
+                                              const lh_import_options *options, lh_capture **out);
+/** NeRF's transforms*.json, n files; an alpha channel becomes the mask. */
+LH_API lh_status lh_capture_import_nerf(lh_context *ctx, const char *const *files, size_t n, const char *folder,
+                                        const lh_import_options *options, lh_capture **out);
+/** A COLMAP model's folder, text or binary; photos: the folder that its image names are relative to.
+ *  @return LH_EUNSUPPORTED: a camera model that is not known */
+LH_API lh_status lh_capture_import_colmap(lh_context *ctx, const char *model, const char *photos, const char *folder,
+                                          const lh_import_options *options, lh_capture **out);
+/** n photographs without poses. */
+LH_API lh_status lh_capture_import_photos(lh_context *ctx, const char *const *files, size_t n, const char *folder,
+                                          const lh_import_options *options, lh_capture **out);
+/** Adds masks, named like their photographs, from a folder to a capture and saves it. count: NULL, or how many.
+ *  @return LH_ENOTFOUND: no picture fits any shot; LH_EINPUT: a size that is not the photograph's, a colour picture */
+LH_API lh_status lh_capture_import_masks(lh_context *ctx, lh_capture *capture, const char *folder, size_t *count);
+/** Adds n photographs of the empty enclosure, which keying learns the background from, and saves the capture. */
+LH_API lh_status lh_capture_import_enclosure(lh_context *ctx, lh_capture *capture, const char *const *files, size_t n,
+                                             int32_t reference);
+
+/** A COLMAP text model into a new or empty folder. max_refit_error_px: of a lens in the other model, 0: 0.5;
+ *  largest_error_px: NULL, or what it came to.
+ *  @return LH_EUNSUPPORTED: a camera that can't be expressed; LH_EINPUT: no photograph has a pose */
+LH_API lh_status lh_capture_export_colmap(lh_context *ctx, const lh_capture *capture, const char *folder,
+                                          double max_refit_error_px, double *largest_error_px);
+/** NeRF's transforms.json. The same parameters and errors. */
+LH_API lh_status lh_capture_export_nerf(lh_context *ctx, const lh_capture *capture, const char *file,
+                                        double max_refit_error_px, double *largest_error_px);
+
+/* ---- new views --------------------------------------------------------------------------------------------------- */
+
+/** Renders new views of a capture that has a hull. Photographs are read when first needed and kept for the next view. */
+typedef struct lh_renderer lh_renderer;
+
+/** method: "lumigraph" blends photographs on the hull; "mean_texture" shows the model in textured.glb; "shaded" the bare
+ *  hull in grey. What it needs of the capture is copied. @return LH_ENOTFOUND: the stage that makes it has not been run */
+LH_API lh_status lh_renderer_create(lh_context *ctx, const lh_capture *capture, const char *method, lh_renderer **out);
+LH_API void lh_renderer_destroy(lh_renderer *renderer);
+
+/**
+ * Renders a view.
+ *
+ * @param camera         any size and lens
+ * @param cam_from_world 12
+ * @param rays           rays x rays a pixel, 1 … 8; 0: 2
+ * @param rgba           height x width x 4, 8-bit sRGB, straight alpha: the share of a pixel's rays that hit the object
+ * @param rgba_size      bytes that rgba has: at least height x width x 4
+ * @param depth          NULL, or height x width: least z in the camera's frame, infinite where nothing was hit
+ */
+LH_API lh_status lh_renderer_render(lh_context *ctx, lh_renderer *renderer, const lh_camera *camera,
+                                    const double cam_from_world[12], int32_t rays, uint8_t *rgba, size_t rgba_size,
+                                    float *depth);
+
+/**
+ * Cameras for a full turn around the object, which fits into every picture; up is what the photographs have as up.
+ *
+ * @param frames         1 … 100,000
+ * @param width, height  of the pictures, px
+ * @param elevation_rad  above the horizon, -pi/2 … pi/2
+ * @param camera         that of all frames; its struct_size says how much of it is filled
+ * @param cam_from_world frames x 12
+ */
+LH_API lh_status lh_renderer_turntable(lh_context *ctx, const lh_renderer *renderer, size_t frames, int32_t width,
+                                       int32_t height, double elevation_rad, lh_camera *camera, double *cam_from_world);
+
+/* ---- how good is it ---------------------------------------------------------------------------------------------- */
+
+/*
+ * a, b: height x width x 3, 8-bit sRGB; mask: NULL, or height x width: only pixels of 128 and more count (NaN where there
+ * is none).
+ */
+
+/** Peak signal-to-noise ratio in dB: 10 log10(255² / mean squared error); 100 for equal pictures. */
+LH_API lh_status lh_picture_psnr(lh_context *ctx, const uint8_t *a, const uint8_t *b, const uint8_t *mask, int32_t width,
+                                 int32_t height, double *out);
+/** Structural similarity (Wang et al. 2004), 11 x 11, sigma 1.5; at least 11 x 11 pixels. */
+LH_API lh_status lh_picture_ssim(lh_context *ctx, const uint8_t *a, const uint8_t *b, const uint8_t *mask, int32_t width,
+                                 int32_t height, double *out);
+/** Intersection over union of the pixels of 128 and more of two masks, height x width; 1 where both are empty. */
+LH_API lh_status lh_mask_iou(lh_context *ctx, const uint8_t *a, const uint8_t *b, int32_t width, int32_t height,
+                             double *out);
 
 #ifdef __cplusplus
 }

@@ -31,6 +31,12 @@ T& given(T* pointer, const char* name) {
 /// A string that is not NULL.
 inline const char* text(const char* pointer, const char* name) { return &given(pointer, name); }
 
+/// The rule of the option structs: zero is the default.
+template <class T>
+T or_default(T value, T fallback) {
+  return value == T(0) ? fallback : value;
+}
+
 /// A file's or folder's name: not NULL, not empty.
 inline std::string path(const char* pointer, const char* name) {
   if (*text(pointer, name) == '\0') invalid("expected a path, found an empty string", name);
@@ -78,7 +84,8 @@ T read_struct(const T* user, const char* name) {
   const std::size_t size = checked_struct_size(user->struct_size, name);
   const auto* bytes = reinterpret_cast<const unsigned char*>(user);
   if (size > sizeof(T) && std::any_of(bytes + sizeof(T), bytes + size, [](unsigned char b) { return b != 0; }))
-    invalid("the structure is from a later version of lumihull.h and sets a field that this library does not know", name);
+    invalid("the structure is from a later version of lumihull.h and sets a field that this library does not know",
+            name);
   std::memcpy(&value, bytes, std::min(size, sizeof(T)));
   value.struct_size = sizeof(T);
   return value;

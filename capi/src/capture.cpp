@@ -121,6 +121,13 @@ lh_status lh_capture_set_hold_out(lh_context* ctx, lh_capture* capture, int32_t 
   return guarded(ctx, [&] { given(capture, "capture").value.set_hold_out(n); });
 }
 
+lh_status lh_capture_set_background(lh_context* ctx, lh_capture* capture, const uint8_t rgb[3]) {
+  return guarded(ctx, [&] {
+    given(rgb, "rgb");
+    given(capture, "capture").value.background_rgb = {rgb[0], rgb[1], rgb[2]};
+  });
+}
+
 lh_status lh_capture_get_pose(lh_context* ctx, const lh_capture* capture, size_t shot, double cam_from_world[12]) {
   return guarded(ctx, [&] {
     const Shot& s = shot_of(capture, shot);

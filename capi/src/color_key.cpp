@@ -20,12 +20,6 @@ std::span<const Rgb> colors(const uint8_t* rgb, size_t n, const char* name) {
   return {reinterpret_cast<const Rgb*>(array(rgb, n, 3, name).data()), n};
 }
 
-/// The rule of ColorKeyOptions' defaults: zero is the default.
-template <class T>
-T or_default(T value, T fallback) {
-  return value == T(0) ? fallback : value;
-}
-
 }  // namespace
 
 lh_status lh_color_key_train(lh_context* ctx, const uint8_t* background, size_t n, const uint8_t* foreground, size_t m,
@@ -86,10 +80,17 @@ lh_status lh_color_key_silhouette(lh_context* ctx, const lh_color_key* key, cons
     const lh_silhouette_options o = read_struct(user, "options");
     calib::KeyImageOptions options;
     switch (o.edges) {
-      case LH_EDGES_SOFT: options.edges = calib::EdgeMode::soft; break;
-      case LH_EDGES_HARD: options.edges = calib::EdgeMode::hard; break;
-      case LH_EDGES_MATTE: options.edges = calib::EdgeMode::matte; break;
-      default: invalid("expected LH_EDGES_SOFT, LH_EDGES_HARD or LH_EDGES_MATTE, found " + std::to_string(o.edges), "edges");
+      case LH_EDGES_SOFT:
+        options.edges = calib::EdgeMode::soft;
+        break;
+      case LH_EDGES_HARD:
+        options.edges = calib::EdgeMode::hard;
+        break;
+      case LH_EDGES_MATTE:
+        options.edges = calib::EdgeMode::matte;
+        break;
+      default:
+        invalid("expected LH_EDGES_SOFT, LH_EDGES_HARD or LH_EDGES_MATTE, found " + std::to_string(o.edges), "edges");
     }
     options.smallest_object_px = o.smallest_object_px;
     options.largest_hole_px = o.largest_hole_px;

@@ -55,17 +55,28 @@ using lumihull::capi::guarded;
 
 const char* lh_status_text(lh_status status) {
   switch (status) {
-    case LH_OK: return "done";
-    case LH_EINVAL: return "invalid argument";
-    case LH_EINPUT: return "bad input";
-    case LH_ENOTFOUND: return "not found";
-    case LH_EIO: return "read or write error";
-    case LH_EUNSUPPORTED: return "unsupported";
-    case LH_EDEGENERATE: return "degenerate geometry";
-    case LH_ENOMEM: return "out of memory";
-    case LH_ECANCELLED: return "cancelled";
-    case LH_EINTERNAL: return "internal error";
-    default: return "unknown status";
+    case LH_OK:
+      return "done";
+    case LH_EINVAL:
+      return "invalid argument";
+    case LH_EINPUT:
+      return "bad input";
+    case LH_ENOTFOUND:
+      return "not found";
+    case LH_EIO:
+      return "read or write error";
+    case LH_EUNSUPPORTED:
+      return "unsupported";
+    case LH_EDEGENERATE:
+      return "degenerate geometry";
+    case LH_ENOMEM:
+      return "out of memory";
+    case LH_ECANCELLED:
+      return "cancelled";
+    case LH_EINTERNAL:
+      return "internal error";
+    default:
+      return "unknown status";
   }
 }
 
@@ -85,8 +96,8 @@ lh_status lh_context_set_progress(lh_context* ctx, lh_progress_fn fn, void* user
 lh_status lh_context_set_threads(lh_context* ctx, uint32_t threads) {
   return guarded(ctx, [&] {
     if (threads > lumihull::capi::kMaxThreads)
-      throw lumihull::Error(lumihull::ErrorCode::invalid_argument, "expected at most 1024, found " + std::to_string(threads),
-                            "threads");
+      throw lumihull::Error(lumihull::ErrorCode::invalid_argument,
+                            "expected at most 1024, found " + std::to_string(threads), "threads");
     ctx->threads = threads;
   });
 }

@@ -32,8 +32,8 @@ struct lh_context {
 
 namespace lumihull::capi {
 
-/// The job of one call. `lh_context_cancel` must work from a signal handler, so no mutex protects ctx.job: the call takes
-/// the pointer away and then waits for those who may have seen it.
+/// The job of one call. `lh_context_cancel` must work from a signal handler, so no mutex protects ctx.job: the call
+/// takes the pointer away and then waits for those who may have seen it.
 class CallJob {
  public:
   explicit CallJob(lh_context& ctx);

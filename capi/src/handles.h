@@ -8,6 +8,8 @@
 #include <lumihull/hull/mesh.h>
 #include <lumihull/hull/ray_scene.h>
 
+#include <cstddef>
+
 struct lh_image {
   lumihull::Image value;
 };

@@ -18,10 +18,14 @@ ReadOptions read_options(const lh_image_options* user) {
 
 PixelType pixel_type(int32_t type) {
   switch (type) {
-    case LH_PIXEL_U8: return PixelType::u8;
-    case LH_PIXEL_U16: return PixelType::u16;
-    case LH_PIXEL_F32: return PixelType::f32;
-    default: invalid("expected LH_PIXEL_U8, LH_PIXEL_U16 or LH_PIXEL_F32, found " + std::to_string(type), "pixel_type");
+    case LH_PIXEL_U8:
+      return PixelType::u8;
+    case LH_PIXEL_U16:
+      return PixelType::u16;
+    case LH_PIXEL_F32:
+      return PixelType::f32;
+    default:
+      invalid("expected LH_PIXEL_U8, LH_PIXEL_U16 or LH_PIXEL_F32, found " + std::to_string(type), "pixel_type");
   }
 }
 

@@ -20,7 +20,9 @@ namespace {
 constexpr size_t kChunk = 4096;  ///< rays handed over at once
 
 /// Whether Embree can walk along it: what is not finite hits nothing.
-bool castable(const Ray& ray) { return ray.origin.allFinite() && ray.direction.allFinite() && !ray.direction.isZero(0); }
+bool castable(const Ray& ray) {
+  return ray.origin.allFinite() && ray.direction.allFinite() && !ray.direction.isZero(0);
+}
 
 Eigen::Vector3f vector(const float* xyz, size_t i) { return Eigen::Map<const Eigen::Vector3f>(xyz + 3 * i); }
 
@@ -68,7 +70,8 @@ lh_status lh_ray_scene_occluded(lh_context* ctx, const lh_ray_scene* scene, cons
     array(a, n, 3, "a");
     array(b, n, 3, "b");
     array(occluded, n, 1, "occluded");
-    if (!(margin >= 0 && margin < 0.5f)) invalid("expected 0 <= margin < 0.5, found " + std::to_string(margin), "margin");
+    if (!(margin >= 0 && margin < 0.5f))
+      invalid("expected 0 <= margin < 0.5, found " + std::to_string(margin), "margin");
     parallel_chunks(job, n, kChunk, [&](size_t first, size_t last) {
       std::vector<Ray> rays(last - first);
       for (size_t i = first; i < last; ++i) {
