@@ -52,6 +52,15 @@ void describe(Opened& opened) {
   set_text(h.lens, sizeof h.lens, std::string(spec.get_string_attribute("Exif:LensModel")));
 }
 
+/// EXIF orientation of a camera RAW file. With "raw:user_flip" the turn that LibRaw would make is no longer told, so
+/// the header is read a second time. LibRaw counts: 1 mirrors columns, 2 mirrors rows, 4 exchanges both before.
+int raw_orientation(const char* file) {
+  constexpr int kExif[8] = {1, 2, 4, 3, 5, 8, 6, 7};
+  const auto input = OIIO::ImageInput::open(file);
+  const int flip = input ? input->spec().get_int_attribute("raw:flip", 0) : 0;
+  return flip >= 0 && flip < 8 ? kExif[flip] : 1;
+}
+
 void* open(const char* file, lumihull_image_header* header, char* error, std::int32_t error_size) {
   try {
     OIIO::ImageSpec hints;
@@ -70,6 +79,7 @@ void* open(const char* file, lumihull_image_header* header, char* error, std::in
       return nullptr;
     }
     describe(*opened);
+    if (std::strcmp(opened->input->format_name(), "raw") == 0) opened->header.orientation = raw_orientation(file);
     *header = opened->header;
     return opened.release();
   } catch (const std::exception& e) {
