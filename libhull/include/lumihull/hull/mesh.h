@@ -4,7 +4,6 @@
 #include <lumihull/base/job.h>
 
 #include <Eigen/Core>
-
 #include <array>
 #include <cstdint>
 #include <filesystem>

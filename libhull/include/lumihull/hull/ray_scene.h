@@ -4,7 +4,6 @@
 #include <lumihull/hull/mesh.h>
 
 #include <Eigen/Core>
-
 #include <cstdint>
 #include <limits>
 #include <memory>

@@ -1,0 +1,237 @@
+#include <lumihull/base/error.h>
+#include <lumihull/base/parallel.h>
+#include <lumihull/hull/region.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "explain.h"
+#include "hull_function.h"
+#include "occupancy.h"
+#include "polytope.h"
+
+namespace lumihull::hull {
+namespace {
+
+constexpr int kCells = 64;  // of the coarse carve, along each side
+
+bool constrains(const Silhouette& s) { return !s.is_empty() && !s.is_full(); }
+
+/// The box around the intersection of the pyramids through the silhouettes that lie wholly in their pictures: it
+/// contains the hull. nullopt where it is unbounded or empty.
+std::optional<Box> intersect_pyramids(std::span<const View> views, std::span<const Silhouette> silhouettes) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const View& v : views) middle += v.center() / double(views.size());
+  double reach = 0;
+  for (const View& v : views) reach = std::max(reach, (v.center() - middle).norm());
+  if (!(reach > 0)) return std::nullopt;
+  const Eigen::Vector3d far = Eigen::Vector3d::Constant(1000 * reach);
+  Polytope polytope({middle - far, middle + far});
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const SilhouetteBounds& b = silhouettes[i].bounds();
+    if (!constrains(silhouettes[i]) || b.touches_border) continue;
+    const Eigen::Matrix<double, 3, 4> m = views[i].cam_from_world.matrix();
+    for (const Eigen::RowVector3d& side :
+         {Eigen::RowVector3d(1, 0, -b.min.x()), Eigen::RowVector3d(-1, 0, b.max.x()),
+          Eigen::RowVector3d(0, 1, -b.min.y()), Eigen::RowVector3d(0, -1, b.max.y()), Eigen::RowVector3d(0, 0, 1)}) {
+      const Eigen::RowVector4d plane = side * m;
+      polytope.clip({plane.head<3>().transpose(), plane[3]});
+    }
+    if (polytope.empty()) return std::nullopt;
+  }
+  const Box box = polytope.bounds();
+  const Eigen::Vector3d slack = 0.001 * far;
+  if (((box.min - middle + far).array() < slack.array()).any() ||
+      ((middle + far - box.max).array() < slack.array()).any())
+    return std::nullopt;
+  return box;
+}
+
+/// A cube around the point that the rays through the silhouettes' middles come nearest to.
+std::optional<Box> meet_rays(std::span<const View> views, std::span<const Silhouette> silhouettes) {
+  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (!constrains(silhouettes[i])) continue;
+    const SilhouetteBounds& s = silhouettes[i].bounds();
+    const Eigen::Vector2d middle = 0.5 * (s.min + s.max);
+    const Eigen::Vector3d d =
+        (views[i].cam_from_world.rotation.conjugate() * Eigen::Vector3d(middle.x(), middle.y(), 1)).normalized();
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
+    a += across;
+    b += across * views[i].center();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(a);
+  if (!(eigen.eigenvalues()[0] > 1e-6 * eigen.eigenvalues()[2])) return std::nullopt;
+  const Eigen::Vector3d point =
+      eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * (eigen.eigenvectors().transpose() * b);
+  std::vector<double> halves;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const double depth = (views[i].cam_from_world * point).z();
+    const SilhouetteBounds& s = silhouettes[i].bounds();
+    if (constrains(silhouettes[i]) && depth > 0) halves.push_back(0.5 * (s.max - s.min).maxCoeff() * depth);
+  }
+  if (halves.empty()) return std::nullopt;
+  std::nth_element(halves.begin(), halves.begin() + std::ptrdiff_t(halves.size() / 2), halves.end());
+  const Eigen::Vector3d half = Eigen::Vector3d::Constant(1.3 * halves[halves.size() / 2]);
+  if (!(half[0] > 0) || !half.allFinite()) return std::nullopt;
+  return Box{point - half, point + half};
+}
+
+/// Makes a box's sides at least a thousandth of its longest: flat objects have a volume, too.
+Box grown(Box box, double share) {
+  const Eigen::Vector3d margin = (share * box.size()).cwiseMax(0.001 * box.size().maxCoeff());
+  return {box.min - margin, box.max + margin};
+}
+
+}  // namespace
+
+Box find_region(std::span<const View> views, std::span<const Silhouette> silhouettes, const CarveRule& rule,
+                std::span<const std::string> names, Job& job) {
+  const HullFunction function(views, silhouettes, rule);
+  const auto count = std::count_if(silhouettes.begin(), silhouettes.end(), constrains);
+  if (count < 2)
+    throw Error(
+        ErrorCode::degenerate,
+        "a region of space needs at least 2 silhouettes with object and background, not " + std::to_string(count));
+  // With a tolerance single silhouettes prove nothing.
+  std::optional<Box> start;
+  if (rule.tolerance == 1) start = intersect_pyramids(views, silhouettes);
+  if (!start) start = meet_rays(views, silhouettes);
+  if (!start)
+    throw Error(ErrorCode::degenerate,
+                "the views have no bounded region of space in common (they look along one direction); give a region");
+  Box box = grown(*start, 0.08);
+  const double first_size = box.size().maxCoeff();
+  int empty = 0;
+  for (int round = 0; round < 40; ++round) {
+    job.check();
+    Occupancy cells = occupancy(function.impl(), box, kCells, job);
+    remove_specks(cells, 0.01);
+    std::array<int, 3> first, last;
+    if (!extent(cells, first, last)) {
+      // The start may have missed it.
+      if (++empty == 3) throw vanished(function, box, names, job);
+      box = grown(box, 0.5);
+      continue;
+    }
+    const Eigen::Vector3d cell = box.size() / kCells;
+    Box tight, grow = box;
+    bool touches = false;
+    double fill = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto a = Eigen::Index(axis);
+      tight.min[a] = box.min[a] + (first[axis] - 1) * cell[a];
+      tight.max[a] = box.min[a] + (last[axis] + 2) * cell[a];
+      if (first[axis] == 0) touches = true, grow.min[a] -= 0.3 * box.size()[a];
+      if (last[axis] == kCells - 1) touches = true, grow.max[a] += 0.3 * box.size()[a];
+      fill = std::max(fill, double(last[axis] - first[axis] + 1) / kCells);
+    }
+    if (touches) {
+      if (grow.size().maxCoeff() > 100 * first_size) break;
+      box = grow;
+      continue;
+    }
+    if (fill > 0.7) return tight;
+    box = tight;
+  }
+  throw Error(ErrorCode::degenerate, "the hull goes on without end: the views do not enclose it; give a region");
+}
+
+SilhouetteOptions silhouette_options(const View& view, const Box& region, int resolution) {
+  const double voxel = make_grid(region, resolution).voxel;
+  const double depth = (view.cam_from_world * region.center()).z();
+  const double nearest = std::max(depth - 0.5 * region.size().norm(), 0.25 * depth);
+  SilhouetteOptions options;
+  if (!(depth > 0)) return options;
+  const double px = voxel * view.camera.f * std::max(1.0, view.camera.s);  // footprint at depth 1
+  options.cell_px = std::clamp(std::floor(0.25 * px / depth), 1.0, 64.0);
+  options.band_px = std::clamp(2 * px / nearest, 2.0, 1e4);
+  return options;
+}
+
+std::vector<Silhouette> make_silhouettes(std::span<const View> views, const std::function<Image(std::size_t)>& load,
+                                         const std::optional<Box>& region_in, int resolution, const CarveRule& rule,
+                                         std::span<const std::string> names, Job& job) {
+  const auto named = [&](std::size_t i, const auto& body) {
+    try {
+      return body();
+    } catch (const Error& e) {
+      if (!e.subject().empty()) throw;
+      throw Error(e.code(), e.message(), name_of(names, i));
+    }
+  };
+  std::optional<Box> region = region_in;
+  if (!region && !views.empty()) {
+    constexpr std::size_t kSample = 24;
+    const std::size_t n = std::min(views.size(), kSample);
+    std::vector<std::optional<Silhouette>> coarse(n);
+    const auto nth = [&](std::size_t k) { return k * views.size() / n; };
+    parallel_for(job, n, [&](std::size_t k) {
+      const std::size_t i = nth(k);
+      coarse[k] = named(i, [&] {
+        const Camera& camera = views[i].camera;
+        const double cell = std::clamp(std::round(std::max(camera.width, camera.height) / 256.0), 1.0, 64.0);
+        return Silhouette::from_mask(load(i), camera, {cell, 2 * cell});
+      });
+    });
+    std::vector<View> some_views;
+    std::vector<Silhouette> some;
+    std::vector<std::string> some_names;
+    for (std::size_t k = 0; k < n; ++k) {
+      if (!constrains(*coarse[k])) continue;
+      some_views.push_back(views[nth(k)]);
+      some.push_back(*coarse[k]);
+      some_names.push_back(name_of(names, nth(k)));
+    }
+    CarveRule some_rule = rule;
+    if (rule.tolerance > 1)
+      some_rule.tolerance =
+          std::min({rule.tolerance, 2 + int(double(rule.tolerance) * double(n) / double(views.size())),
+                    std::max(int(some.size()), 1)});
+    some_rule.min_views = 1;
+    region = find_region(some_views, some, some_rule, some_names, job);
+  }
+
+  std::vector<SilhouetteOptions> options(views.size());
+  // Photographs of one camera share the lens's tables.
+  using Key = std::array<double, 13>;
+  std::map<Key, std::pair<std::size_t, std::optional<SilhouetteMaker>>> makers;
+  std::vector<Key> keys(views.size());
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    options[i] = named(i, [&] {
+      views[i].camera.validate();
+      return silhouette_options(views[i], *region, resolution);
+    });
+    const Camera& c = views[i].camera;
+    keys[i] = {double(c.width),   double(c.height), c.f, c.s, c.skew, c.u0, c.v0, c.k1, c.k2, c.k3, c.p1, c.p2,
+               options[i].cell_px};
+    ++makers[keys[i]].first;
+  }
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    auto& [n, maker] = makers[keys[i]];
+    if (n > 1 && !maker) maker = named(i, [&] { return SilhouetteMaker(views[i].camera, options[i].cell_px); });
+  }
+  std::vector<std::optional<Silhouette>> made(views.size());
+  job.begin("distance fields", views.size());
+  parallel_for(
+      job, views.size(),
+      [&](std::size_t i) {
+        made[i] = named(i, [&] {
+          const auto& maker = makers.at(keys[i]).second;
+          return maker ? maker->make(load(i), options[i].band_px)
+                       : Silhouette::from_mask(load(i), views[i].camera, options[i]);
+        });
+      },
+      true);
+  job.end();
+  std::vector<Silhouette> result;
+  result.reserve(made.size());
+  for (auto& s : made) result.push_back(std::move(*s));
+  return result;
+}
+
+}  // namespace lumihull::hull
