@@ -92,9 +92,10 @@ std::vector<Vector2d> grid(int width, int height, int columns, int rows) {
 constexpr int kFitColumns = 33, kFitRows = 25, kCheckColumns = 65, kCheckRows = 49;
 
 /// Levenberg-Marquardt with a Jacobian by central differences. `residuals` returns false where the parameters make no
-/// sense. Small problems only: about 10 parameters, 1000 residuals.
+/// sense; it ends when a step gains less than `least_gain` of the cost. Small problems only: about 10 parameters, 1000
+/// residuals.
 void minimise(const std::function<bool(const VectorXd&, VectorXd&)>& residuals, VectorXd& parameters,
-              const VectorXd& scale) {
+              const VectorXd& scale, double least_gain) {
   VectorXd r, plus, minus;
   if (!residuals(parameters, r)) return;
   double cost = r.squaredNorm(), damping = 1e-6;
@@ -130,8 +131,31 @@ void minimise(const std::function<bool(const VectorXd&, VectorXd&)>& residuals, 
         damping *= 10;
       }
     }
-    if (!better || gain < 1e-12 * cost || cost < 1e-18) return;
+    if (!better || gain < least_gain * cost || cost < 1e-18) return;
   }
+}
+
+/// Least squares first, then the eighth powers of the samples' distances: a refit is judged by its largest error, which
+/// least squares alone leaves in the picture's corners. Residuals: u, v, u, v, …
+void minimise_largest(const std::function<bool(const VectorXd&, VectorXd&)>& residuals, VectorXd& parameters,
+                      const VectorXd& scale) {
+  minimise(residuals, parameters, scale, 1e-9);
+  const auto largest = [&](const VectorXd& p) {
+    VectorXd r;
+    return residuals(p, r) ? Eigen::Map<const Eigen::Matrix2Xd>(r.data(), 2, r.size() / 2).colwise().norm().maxCoeff()
+                           : INFINITY;
+  };
+  const double unit = largest(parameters);
+  if (!(unit > 1e-4) || !std::isfinite(unit)) return;
+  VectorXd polished = parameters;
+  minimise(
+      [&](const VectorXd& p, VectorXd& r) {
+        if (!residuals(p, r)) return false;
+        for (Eigen::Index i = 0; i < r.size(); i += 2) r.segment<2>(i) *= std::pow(r.segment<2>(i).norm() / unit, 3);
+        return true;
+      },
+      polished, scale, 1e-3);
+  if (largest(polished) < unit) parameters = polished;
 }
 
 std::string px(double value) {
@@ -213,7 +237,7 @@ Refit refit_camera(const ForwardCamera& theirs, double limit_px, const std::stri
   VectorXd parameters(9), scale(9);
   parameters << camera.f, camera.s, camera.u0, camera.v0, camera.k1, camera.k2, camera.k3, camera.p1, camera.p2;
   scale << camera.f, 1, camera.f, camera.f, 1, 1, 1, 1, 1;
-  minimise(
+  minimise_largest(
       [&](const VectorXd& p, VectorXd& r) {
         const Camera c = unpack(p);
         if (!(c.f > 0) || !(c.s > 0)) return false;
@@ -291,7 +315,7 @@ ForwardRefit refit_forward(const Camera& camera, int terms, const std::string& n
     parameters(6) = -camera.k1;
     parameters(7) = 3 * camera.k1 * camera.k1 - camera.k2;
   }
-  minimise(
+  minimise_largest(
       [&](const VectorXd& p, VectorXd& r) {
         const ForwardCamera c = unpack(p);
         r.resize(2 * Eigen::Index(rays.size()));
