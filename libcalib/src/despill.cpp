@@ -52,7 +52,8 @@ Despill::Despill(std::span<const ColorCount> background) {
 
 Eigen::Vector3f Despill::operator()(const Eigen::Vector3f& color, SpillMode mode, float strength) const {
   if (neutral()) return color;
-  const float spill = axis_.dot(color);
+  // a · colour with a's sum of zero put in: exactly zero for a grey.
+  const float spill = axis_.x() * (color.x() - color.y()) + axis_.z() * (color.z() - color.y());
   if (!(spill > 0)) return color;
   if (mode == SpillMode::limit) return (color - strength * spill * lower_).cwiseMax(color.cwiseMin(0.0f));
   const Eigen::Vector3f d = chroma(color);

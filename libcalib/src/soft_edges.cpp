@@ -10,8 +10,10 @@
 namespace lumihull::calib {
 namespace {
 
-constexpr int kRadius = 3;           // of the window for local means, px
-constexpr int kLeastContrast = 400;  // |F - B|², 8-bit values: below it colours say nothing about coverage
+constexpr int kRadius = 3;             // of the window for local means, px
+constexpr float kLeastContrast = 400;  // |F - B|², 8-bit values: below it colours say nothing about coverage
+// Squared distance from the line through B and F up to which a colour may be a mixture: noise, and a share of |F - B|².
+constexpr float kNoise = 300, kPlay = 0.02f;
 
 struct Mean {
   int count = 0;
@@ -60,15 +62,20 @@ void soften(const BitMask& decisions, const Image& rgb, EdgeMode mode, Image& ou
         Mean f = mean_of(sure_object, rgb, x, y);
         if (f.count == 0) f = mean_of(narrow_object, rgb, x, y);
         if (f.count == 0) continue;
-        float along = 0, length = 0;
+        float along = 0, length = 0, distance = 0;
         for (std::size_t c = 0; c < 3; ++c) {
           const float mean_b = float(b.sum[c]) / float(b.count), d = float(f.sum[c]) / float(f.count) - mean_b;
-          along += (float(pixels[3 * std::size_t(x) + c]) - mean_b) * d;
+          const float from_b = float(pixels[3 * std::size_t(x) + c]) - mean_b;
+          along += from_b * d;
           length += d * d;
+          distance += from_b * from_b;
         }
-        if (length < float(kLeastContrast)) continue;
+        if (length < kLeastContrast) continue;
+        // A colour far off the line from B to F is no mixture of them (a dark contour, a stripe): its decision stands.
+        const float off_line = distance - along * along / length;
+        const bool mixture = off_line < kNoise + kPlay * length;
         int a = int(std::lround(255 * std::clamp(along / length, 0.0f, 1.0f)));
-        if (mode == EdgeMode::soft) a = (object >> (x & 63) & 1) ? std::max(a, 128) : std::min(a, 127);
+        if (mode == EdgeMode::soft || !mixture) a = (object >> (x & 63) & 1) ? std::max(a, 128) : std::min(a, 127);
         alpha[x] = std::uint8_t(a);
       }
     }

@@ -136,7 +136,7 @@ KeyReport key_capture(Capture& capture, const KeyOptions& options, Job& job) {
           if (learned->hull && capture.positioned(shot)) {
             view.view = capture.view(shot);
             view.mask = Image(std::max(1, photo.width() / view.step), std::max(1, photo.height() / view.step), 1);
-            near = learned->hull->silhouette(view, 3 + int(std::ceil(learned->hull->voxel_px(view))));
+            near = learned->hull->silhouette(view, learned->hull->margin_px(view));
           }
           confine(mask, calib::find_frame(photo), near ? &*near : nullptr, view.step);
         }

@@ -206,6 +206,8 @@ double CoarseHull::voxel_px(const CoarseView& view) const {
   return grid_.voxel * jacobian.norm() / std::sqrt(2.0) / view.step;
 }
 
+int CoarseHull::margin_px(const CoarseView& view) const { return 3 + int(std::ceil(voxel_px(view))); }
+
 Image CoarseHull::silhouette(const CoarseView& view, int grow) const {
   Image out(view.mask.width(), view.mask.height(), 1);
   const Lattice lattice = project(view, grid_.low, grid_.voxel, grid_.n);
@@ -247,6 +249,16 @@ Image grown(const Image& mask, int radius) {
     for (int x = 0; x < width; ++x) to[x] = last[std::size_t(x)] >= y - radius ? 255 : 0;
   }
   return out;
+}
+
+Image shrunk(const Image& mask, int radius) {
+  const auto inverted = [](Image image) {
+    for (int y = 0; y < image.height(); ++y)
+      for (int x = 0; x < image.width(); ++x)
+        image.row<std::uint8_t>(y)[x] = image.row<std::uint8_t>(y)[x] >= 128 ? 0 : 255;
+    return image;
+  };
+  return inverted(grown(inverted(mask), radius));
 }
 
 }  // namespace lumihull::hull

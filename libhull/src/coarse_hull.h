@@ -35,8 +35,8 @@ class CoarseHull {
   /// Where the hull is in a view, grown by `grow` coarse pixels: 8 bits, 255 inside.
   Image silhouette(const CoarseView& view, int grow) const;
 
-  /// Length of a voxel's side in coarse pixels of a view, at the hull's centre.
-  double voxel_px(const CoarseView& view) const;
+  /// How far beyond `silhouette` the object may reach in a view, coarse pixels: what the grid can't tell.
+  int margin_px(const CoarseView& view) const;
 
  private:
   struct Grid {
@@ -45,6 +45,7 @@ class CoarseHull {
     int n = 0;  ///< voxels a side
     Eigen::Vector3d center() const { return low + Eigen::Vector3d::Constant(0.5 * voxel * n); }
   };
+  double voxel_px(const CoarseView& view) const;
   static std::vector<std::uint8_t> vote(std::span<const CoarseView> views, const Grid& grid, double tolerance,
                                         Job& job);
 
@@ -54,5 +55,7 @@ class CoarseHull {
 
 /// Object pixels of an 8-bit mask (>= 128) and all within `radius` pixels along rows and columns of one: 255, else 0.
 Image grown(const Image& mask, int radius);
+/// Object pixels without background within `radius` pixels along rows and columns: 255, else 0.
+Image shrunk(const Image& mask, int radius);
 
 }  // namespace lumihull::hull

@@ -15,19 +15,71 @@ constexpr std::size_t kMostPhotos = 64;  // evenly spread; they stay in memory, 
 constexpr double kMostPixels = 500'000;  // of a thinned photograph
 constexpr int kResolution = 96;          // voxels a side
 constexpr double kTolerance = 0.12;      // share of the views that may call an object's voxel background
+constexpr double kShadowShare = 0.2;     // shadows among the background samples
+constexpr double kObjectShare = 0.5;     // samples of the object's own colours, as a share of the background's
 constexpr int kMostRounds = 5;
 constexpr double kSettled = 0.002;  // changed pixels, as a share of the object's
 
-calib::ColorKey train(const std::vector<calib::ColorCount>& background, const std::vector<calib::ColorCount>& object,
-                      const KeyOptions& options, Job& job) {
-  const auto samples = calib::subsample(background, options.max_samples);
+/// SplitMix64 (Steele, Lea & Flood 2014), 0 … 1.
+double next_random(std::uint64_t& state) {
+  std::uint64_t z = state += 0x9E3779B97F4A7C15u;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+  return double((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+std::vector<calib::Rgb> listed(std::span<const calib::ColorCount> colors) {
   std::vector<calib::Rgb> list;
-  for (const auto& s : samples) list.insert(list.end(), s.count, s.color);
-  calib::ColorKey uniform = calib::ColorKey::train(list, {options.k, options.foreground_share, options.seed}, job);
-  if (object.empty()) return uniform;
-  std::vector<calib::ColorCount> foreground(uniform.foreground().begin(), uniform.foreground().end());
-  foreground.insert(foreground.end(), object.begin(), object.end());
-  return calib::ColorKey::train(samples, foreground, options.k, job);
+  for (const auto& c : colors) list.insert(list.end(), c.count, c.color);
+  return list;
+}
+
+/// Background colours in shadow: darkened by a common factor, with a little play a channel (the light that reaches a
+/// shadow has another tint). The shadow beneath an object is never seen beside it, so no photograph teaches it.
+void add_shadows(std::vector<calib::Rgb>& samples, std::size_t count, std::uint64_t seed) {
+  if (samples.empty()) return;
+  const std::size_t n = samples.size();
+  samples.reserve(n + count);
+  std::uint64_t state = seed;
+  for (std::size_t i = 0; i < count; ++i) {
+    calib::Rgb c = samples[i * n / count];
+    const double light = 0.35 + 0.6 * next_random(state);
+    for (std::uint8_t& v : c) v = std::uint8_t(std::clamp(v * light * (0.9 + 0.2 * next_random(state)), 0.0, 255.0));
+    samples.push_back(c);
+  }
+}
+
+/// Where nothing is known of the object: the paper's key.
+calib::ColorKey train(std::span<const calib::ColorCount> background, const KeyOptions& options, Job& job) {
+  return calib::ColorKey::train(listed(calib::subsample(background, options.max_samples)),
+                                {options.k, options.foreground_share, options.seed}, job);
+}
+
+/// With the object's own colours beside the uniform foreground, and with the background's shadows.
+calib::ColorKey train(std::span<const calib::ColorCount> background, std::span<const calib::ColorCount> object,
+                      const KeyOptions& options, Job& job) {
+  const std::size_t shadows = std::size_t(kShadowShare * double(options.max_samples));
+  std::vector<calib::Rgb> samples = listed(calib::subsample(background, options.max_samples - shadows));
+  add_shadows(samples, std::min(shadows, samples.size()), options.seed);
+  const auto uniform = std::size_t(std::llround(options.foreground_share * double(samples.size())));
+  std::vector<calib::ColorCount> foreground =
+      calib::subsample(object, std::size_t(kObjectShare * double(samples.size())));
+  std::uint64_t state = options.seed;
+  for (std::size_t i = 0; i < std::max(uniform, std::size_t(options.k)); ++i) {
+    calib::ColorCount c{{}, 1};
+    for (std::uint8_t& v : c.color) v = std::uint8_t(256 * next_random(state));
+    foreground.push_back(c);
+  }
+  return calib::ColorKey::train(calib::count_colors(samples), foreground, options.k, job);
+}
+
+/// Sets to 0 what lies outside of the frame, or where `near` is 0.
+void confine(Image& mask, const calib::Frame& f, const Image* near) {
+  for (int y = 0; y < mask.height(); ++y) {
+    std::uint8_t* row = mask.row<std::uint8_t>(y);
+    for (int x = 0; x < mask.width(); ++x)
+      if (y < f.y0 || y >= f.y1 || x < f.x0 || x >= f.x1 || (near && !near->row<std::uint8_t>(y)[x])) row[x] = 0;
+  }
 }
 
 }  // namespace
@@ -71,28 +123,21 @@ LearnedKey learn_key(const Capture& capture, std::span<const std::size_t> shots,
 
   std::vector<calib::ColorCount> background = calib::background_of_photos(
       used, [&](std::size_t i) { return photos[i]; }, job);
-  LearnedKey learned{train(background, {}, options, job), {}, 0};
+  LearnedKey learned{train(background, options, job), {}, 0};
 
+  std::vector<Image> near(used);  // where the object can be, once there is a hull
   const auto key_views = [&] {
     parallel_for(job, used, [&](std::size_t i) {
       views[i].mask = calib::key_image(learned.key, photos[i], {calib::EdgeMode::hard, 0, 0});
-      const calib::Frame& f = views[i].frame;
-      for (int y = 0; y < views[i].mask.height(); ++y) {
-        std::uint8_t* row = views[i].mask.row<std::uint8_t>(y);
-        const bool inside = y >= f.y0 && y < f.y1;
-        std::fill(row, row + (inside ? f.x0 : views[i].mask.width()), std::uint8_t(0));
-        if (inside) std::fill(row + f.x1, row + views[i].mask.width(), std::uint8_t(0));
-      }
+      confine(views[i].mask, views[i].frame, near[i].empty() ? nullptr : &near[i]);
       calib::clean_mask(views[i].mask, 64, 0);
     });
   };
   key_views();
   if (std::count(positioned.begin(), positioned.end(), 1) < 3) return learned;
 
-  std::vector<CoarseView> carving;
   for (int round = 1; round <= kMostRounds; ++round) {
-    job.check();
-    carving.clear();
+    std::vector<CoarseView> carving;
     for (std::size_t i = 0; i < used; ++i)
       if (positioned[i]) carving.push_back(views[i]);
     std::optional<CoarseHull> hull = CoarseHull::carve(carving, kResolution, kTolerance, job);
@@ -104,22 +149,23 @@ LearnedKey learn_key(const Capture& capture, std::span<const std::size_t> shots,
     parallel_for(job, used, [&](std::size_t i) {
       if (!positioned[i]) return;
       const CoarseView& v = views[i];
-      const Image near_object = learned.hull->silhouette(v, 3 + int(std::ceil(learned.hull->voxel_px(v))));
+      near[i] = learned.hull->silhouette(v, learned.hull->margin_px(v));
+      const Image sure = shrunk(v.mask, 4);
       for (int y = v.frame.y0; y < v.frame.y1; ++y) {
         const std::uint8_t* p = photos[i].row<std::uint8_t>(y) + 3 * v.frame.x0;
-        const std::uint8_t *near = near_object.row<std::uint8_t>(y), *mask = v.mask.row<std::uint8_t>(y);
+        const std::uint8_t *is_near = near[i].row<std::uint8_t>(y), *is_sure = sure.row<std::uint8_t>(y);
         for (int x = v.frame.x0; x < v.frame.x1; ++x, p += 3) {
-          if (!near[x]) outside.add({p[0], p[1], p[2]});
-          if (near[x] && mask[x]) inside.add({p[0], p[1], p[2]});
+          if (!is_near[x]) outside.add({p[0], p[1], p[2]});
+          if (is_near[x] && is_sure[x]) inside.add({p[0], p[1], p[2]});
         }
       }
     });
     background = outside.counts();
     if (background.empty()) break;
-    learned.key = train(background, {}, options, job);
+    learned.key = train(background, inside.counts(), options, job);
 
     std::vector<Image> before(used);
-    for (std::size_t i = 0; i < used; ++i) before[i] = views[i].mask;
+    for (std::size_t i = 0; i < used; ++i) before[i] = std::move(views[i].mask);
     key_views();
     std::size_t changed = 0, object = 0;
     for (std::size_t i = 0; i < used; ++i)

@@ -25,7 +25,7 @@ struct ColorCount {
 inline constexpr int kMaxNeighbours = 255;
 inline constexpr std::uint64_t kMaxKeySamples = 10'000'000;
 
-struct ColorKeyOptions {
+struct LUMIHULL_API ColorKeyOptions {
   int k = 7;                      ///< neighbours asked, 1 … kMaxNeighbours
   double foreground_share = 0.2;  ///< foreground samples as a share of the background's, > 0; the paper's 20 %
   std::uint64_t seed = 1;         ///< of the uniform foreground samples

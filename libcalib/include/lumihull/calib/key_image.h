@@ -15,7 +15,7 @@ enum class EdgeMode : std::uint8_t {
   matte,  ///< as soft, but the share may move a mixed pixel across the threshold: contours at half coverage
 };
 
-struct KeyImageOptions {
+struct LUMIHULL_API KeyImageOptions {
   EdgeMode edges = EdgeMode::soft;
   int smallest_object_px = 0;  ///< object components of fewer pixels become background (8-connected); 0: kept
   int largest_hole_px = 0;     ///< background components enclosed by object of up to so many pixels are filled; 0: kept
