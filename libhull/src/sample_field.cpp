@@ -103,13 +103,13 @@ class Sampler {
     top.resize(std::size_t(m));
     for (auto& rank : top) rank.fill(-kInfinity);
     const Eigen::Vector3d origin = node(block.x, block.y, block.z);
-    std::array<int, 64> seen;
-    seen.fill(block.seen);
     int whole = 0;
-    bool partly = false;
+    // At the grid's edge the block's outer nodes were not judged: they may be outside the picture.
+    const bool edge = touches_layer(block);
+    bool partly = edge;
     double error = 0;
     for (const std::uint32_t entry : list) {
-      if (entry & kPartly) {
+      if (edge || (entry & kPartly)) {
         partly = true;
         continue;
       }
