@@ -26,16 +26,15 @@ function(lumihull_c_library folder)
 endfunction()
 
 # lumihull_abi_baseline(FOLDER): `ninja abi-baseline` writes FOLDER/abi/lumihull.abi anew: to be done, looked at and
-# committed when the interface grows. The description holds no path and no line numbers.
+# committed when the interface grows.
 function(lumihull_abi_baseline folder)
   find_program(LUMIHULL_ABIDW abidw)
-  find_program(LUMIHULL_ABIDIFF abidiff)
   if(LUMIHULL_ABIDW)
     add_custom_target(abi-baseline
-      COMMAND ${LUMIHULL_ABIDW} --headers-dir ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/include --drop-private-types
-              --drop-undefined-syms --no-comp-dir-path --no-show-locs --no-corpus-path --no-elf-needed
-              --type-id-style hash
-              --out-file ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/abi/lumihull.abi $<TARGET_FILE:lumihull_capi>
+      COMMAND ${CMAKE_COMMAND} -DABIDW=${LUMIHULL_ABIDW} -DLIBRARY=$<TARGET_FILE:lumihull_capi>
+              -DHEADERS=${CMAKE_CURRENT_SOURCE_DIR}/${folder}/include
+              -DOUT=${CMAKE_CURRENT_SOURCE_DIR}/${folder}/abi/lumihull.abi
+              -P ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/abi/describe.cmake
       DEPENDS lumihull_capi COMMENT "Writing ${folder}/abi/lumihull.abi" VERBATIM)
   endif()
 endfunction()

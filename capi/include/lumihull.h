@@ -267,6 +267,35 @@ LH_API lh_status lh_mesh_normals(lh_context *ctx, const lh_mesh *mesh, float *ou
 /** Volume that a closed mesh encloses, in cubic units; positive where its triangles are oriented outwards. */
 LH_API lh_status lh_mesh_volume(lh_context *ctx, const lh_mesh *mesh, double *out);
 
+/** What a mesh is, as a surface. */
+typedef struct lh_mesh_report {
+  size_t struct_size;
+  int32_t closed;                 /**< every edge has two triangles */
+  int32_t manifold;               /**< closed, and the triangles around each vertex are one fan */
+  int32_t oriented;               /**< every edge is passed once in each direction */
+  int32_t self_intersections_known;
+  uint64_t self_intersections;    /**< pairs of triangles that pass through each other */
+  uint64_t degenerate_triangles;  /**< without area */
+  uint64_t unused_vertices;
+  uint64_t parts;                 /**< connected by shared vertices */
+  int64_t euler;                  /**< vertices - edges + triangles: 2 for each part that is like a sphere */
+} lh_mesh_report;
+
+/** Examines a mesh. self_intersections: no leaves that count out; it also stays unknown where the mesh is not manifold and
+ *  where the library was built without CGAL. out: its struct_size says how much of it is filled. */
+LH_API lh_status lh_mesh_check(lh_context *ctx, const lh_mesh *mesh, int32_t self_intersections, lh_mesh_report *out);
+
+/**
+ * A mesh of fewer triangles; closed and manifold where the given one is.
+ *
+ * @param max_triangles at most so many are aimed at; 0: as few as max_error allows
+ * @param max_error     how far the surface may move, by the simplifier's estimate; 0: no bound
+ * @param moved         NULL, or how far it did move: the largest distance between the two surfaces
+ * @return LH_EINVAL: neither bound is set
+ */
+LH_API lh_status lh_mesh_simplify(lh_context *ctx, const lh_mesh *mesh, size_t max_triangles, double max_error,
+                                  lh_mesh **out, double *moved);
+
 /* ---- visual hull ------------------------------------------------------------------------------------------------- */
 
 typedef struct lh_carve_options {

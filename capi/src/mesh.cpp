@@ -1,4 +1,6 @@
 #include <lumihull/hull/mesh.h>
+#include <lumihull/hull/mesh_check.h>
+#include <lumihull/hull/simplify.h>
 
 #include "arguments.h"
 #include "context.h"
@@ -69,4 +71,32 @@ lh_status lh_mesh_normals(lh_context* ctx, const lh_mesh* mesh, float* out, size
 
 lh_status lh_mesh_volume(lh_context* ctx, const lh_mesh* mesh, double* out) {
   return guarded(ctx, [&] { given(out, "out") = hull::enclosed_volume(given(mesh, "mesh").value); });
+}
+
+lh_status lh_mesh_check(lh_context* ctx, const lh_mesh* mesh, int32_t self_intersections, lh_mesh_report* out) {
+  return guarded(ctx, [&] {
+    checked_struct_size(given(out, "out").struct_size, "out");
+    const hull::MeshCheck check = hull::check_mesh(given(mesh, "mesh").value, self_intersections != 0);
+    lh_mesh_report report{};
+    report.closed = check.closed;
+    report.manifold = check.manifold;
+    report.oriented = check.oriented;
+    report.self_intersections_known = check.self_intersections.has_value();
+    report.self_intersections = check.self_intersections.value_or(0);
+    report.degenerate_triangles = check.degenerate_triangles;
+    report.unused_vertices = check.unused_vertices;
+    report.parts = check.parts;
+    report.euler = check.euler;
+    write_struct(out, report, "out");
+  });
+}
+
+lh_status lh_mesh_simplify(lh_context* ctx, const lh_mesh* mesh, size_t max_triangles, double max_error, lh_mesh** out,
+                           double* moved) {
+  return guarded(ctx, [&](Job& job) {
+    given(out, "out");
+    hull::SimplifyResult result = hull::simplify(given(mesh, "mesh").value, {max_triangles, max_error}, job);
+    give(out, std::move(result.mesh));
+    if (moved) *moved = result.moved.max;
+  });
 }

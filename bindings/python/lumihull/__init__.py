@@ -17,6 +17,7 @@ from ._lumihull import ColorKey as ColorKey
 from ._lumihull import Error as Error
 from ._lumihull import Image as Image
 from ._lumihull import Mesh as Mesh
+from ._lumihull import MeshCheck as MeshCheck
 from ._lumihull import Pose as Pose
 from ._lumihull import Progress as Progress
 from ._lumihull import RayScene as RayScene

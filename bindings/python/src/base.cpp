@@ -36,10 +36,10 @@ Eigen::Vector3d vector3(const Array<double>& array, const char* name) {
   return Eigen::Map<const Eigen::Vector3d>(array.data());
 }
 
-py::array matrix_of(const Pose& pose) {
+Array<double> matrix_of(const Pose& pose) {
   Array<double> out({py::ssize_t(3), py::ssize_t(4)});
   Eigen::Map<Matrix34>(out.mutable_data(), 3, 4) = pose.matrix();
-  return std::move(out);
+  return out;
 }
 
 py::array vector_of(const Eigen::Vector3d& v) { return Array<double>(3, v.data()); }

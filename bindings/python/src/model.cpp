@@ -4,8 +4,10 @@
 #include <lumihull/calib/key_image.h>
 #include <lumihull/hull/carve.h>
 #include <lumihull/hull/mesh.h>
+#include <lumihull/hull/mesh_check.h>
 #include <lumihull/hull/ray_scene.h>
 #include <lumihull/hull/region.h>
+#include <lumihull/hull/simplify.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
@@ -139,7 +141,36 @@ void bind_mesh(py::module_& module) {
                                  std::memcpy(out.mutable_data(), normals.data(), std::size_t(out.nbytes()));
                                return out;
                              })
-      .def_property_readonly("volume", &hull::enclosed_volume);
+      .def_property_readonly("volume", &hull::enclosed_volume)
+      .def(
+          "check",
+          [](const Mesh& mesh, bool self_intersections) {
+            py::gil_scoped_release without_gil;
+            return hull::check_mesh(mesh, self_intersections);
+          },
+          py::kw_only(), "self_intersections"_a = true)
+      .def(
+          "simplify",
+          [](const Mesh& mesh, std::size_t max_triangles, double max_error, const py::object& progress,
+             unsigned threads) {
+            return work(progress, threads, [&](Job& job) {
+              return hull::simplify(mesh, {max_triangles, max_error}, job).mesh;
+            });
+          },
+          py::kw_only(), "max_triangles"_a = 0, "max_error"_a = 0.0, "progress"_a = py::none(), "threads"_a = 0,
+          "A mesh of fewer triangles; one of the two bounds must be set.");
+
+  using hull::MeshCheck;
+  py::class_<MeshCheck>(module, "MeshCheck", "What a mesh is, as a surface.")
+      .def_readonly("closed", &MeshCheck::closed)
+      .def_readonly("manifold", &MeshCheck::manifold)
+      .def_readonly("oriented", &MeshCheck::oriented)
+      .def_readonly("degenerate_triangles", &MeshCheck::degenerate_triangles)
+      .def_readonly("unused_vertices", &MeshCheck::unused_vertices)
+      .def_readonly("parts", &MeshCheck::parts)
+      .def_readonly("euler", &MeshCheck::euler)
+      .def_readonly("self_intersections", &MeshCheck::self_intersections, "None: not counted.")
+      .def_property_readonly("good", &MeshCheck::good);
   module.def("read_mesh", &hull::read_mesh, "file"_a, py::call_guard<py::gil_scoped_release>(), "PLY or OBJ.");
   module.def("write_mesh", &hull::write_mesh, "file"_a, "mesh"_a, py::call_guard<py::gil_scoped_release>(),
              "PLY or OBJ, by the file's name; atomically.");
