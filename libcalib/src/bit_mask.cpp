@@ -4,7 +4,7 @@
 #include <cstring>
 #include <numeric>
 
-#ifdef __BMI2__
+#if defined(__BMI2__) || defined(__AVX2__)
 #include <immintrin.h>
 #endif
 
@@ -102,7 +102,14 @@ BitMask::BitMask(const Image& mask) : BitMask(mask.width(), mask.height()) {
   for (int y = 0; y < height; ++y) {
     const std::uint8_t* in = mask.row<std::uint8_t>(y);
     std::uint64_t* out = row(y);
-    for (int x = 0; x < width; ++x) out[x >> 6] |= std::uint64_t(in[x] >> 7) << (x & 63);
+    int x = 0;
+#ifdef __AVX2__
+    for (; x + 32 <= width; x += 32) {
+      const __m256i pixels = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(in + x));
+      out[x >> 6] |= std::uint64_t(std::uint32_t(_mm256_movemask_epi8(pixels))) << (x & 63);
+    }
+#endif
+    for (; x < width; ++x) out[x >> 6] |= std::uint64_t(in[x] >> 7) << (x & 63);
   }
 }
 

@@ -132,7 +132,9 @@ Rgb ColorKey::background_median() const noexcept {
 int ColorKey::foreground_neighbours(Rgb color) const {
   // Squared distances of the k nearest of each kind, ascending; merged, the background first at equal distance.
   const int k = impl_->k;
-  const std::vector<int> b = impl_->near_background.nearest(color, k), f = impl_->near_foreground.nearest(color, k);
+  constexpr int kAnywhere = 3 * 255 * 255;
+  const std::vector<int> f = impl_->near_foreground.nearest(color, k, kAnywhere);
+  const std::vector<int> b = impl_->near_background.nearest(color, k, int(f.size()) == k ? f.back() : kAnywhere);
   std::size_t i = 0, j = 0;
   while (int(i + j) < k) {
     if (j == f.size() || (i < b.size() && b[i] <= f[j]))
@@ -153,14 +155,29 @@ SampleGrid::SampleGrid(std::span<const ColorCount> colors) {
   for (const ColorCount& c : colors) colors_[next[cell(c.color)]++] = c;
 }
 
-std::vector<int> SampleGrid::nearest(Rgb color, int n) const {
+std::vector<int> SampleGrid::nearest(Rgb color, int n, int limit) const {
   std::vector<int> best;
   best.reserve(std::size_t(n) + 1);
+  const auto look_at = [&](const ColorCount& sample) {
+    const int dx = sample.color[0] - color[0], dy = sample.color[1] - color[1], dz = sample.color[2] - color[2];
+    const int d = dx * dx + dy * dy + dz * dz;
+    if (d > limit) return;
+    for (std::uint32_t c = sample.count; c > 0; --c) {
+      if (int(best.size()) == n && d >= best.back()) break;
+      best.insert(std::upper_bound(best.begin(), best.end(), d), d);
+      if (int(best.size()) > n) best.pop_back();
+    }
+  };
+  constexpr std::size_t kFew = 512;
+  if (colors_.size() <= kFew) {
+    for (const ColorCount& sample : colors_) look_at(sample);
+    return best;
+  }
   const int home[3] = {color[0] >> 3, color[1] >> 3, color[2] >> 3};
   for (int shell = 0; shell < kSide; ++shell) {
-    // Every colour in this shell of cells is farther than 8 (shell - 1) along some axis.
+    // Every colour in this shell of cells is at least 8 (shell - 1) + 1 away along some axis.
     const int gap = std::max(0, 8 * (shell - 1) + 1);
-    if (int(best.size()) == n && best.back() <= gap * gap) break;
+    if (gap * gap > limit || (int(best.size()) == n && best.back() <= gap * gap)) break;
     const auto low = [&](int axis) { return std::max(0, home[axis] - shell); };
     const auto high = [&](int axis) { return std::min(kSide - 1, home[axis] + shell); };
     for (int x = low(0); x <= high(0); ++x)
@@ -169,16 +186,7 @@ std::vector<int> SampleGrid::nearest(Rgb color, int n) const {
         for (int z = low(2); z <= high(2); ++z) {
           if (!face && std::abs(z - home[2]) != shell) continue;
           const std::size_t cell = std::size_t((x * kSide + y) * kSide + z);
-          for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
-            const Rgb s = colors_[i].color;
-            const int dx = s[0] - color[0], dy = s[1] - color[1], dz = s[2] - color[2];
-            const int d = dx * dx + dy * dy + dz * dz;
-            for (std::uint32_t c = colors_[i].count; c > 0; --c) {
-              if (int(best.size()) == n && d >= best.back()) break;
-              best.insert(std::upper_bound(best.begin(), best.end(), d), d);
-              if (int(best.size()) > n) best.pop_back();
-            }
-          }
+          for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) look_at(colors_[i]);
         }
       }
   }

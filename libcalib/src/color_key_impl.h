@@ -14,8 +14,8 @@ class SampleGrid {
   SampleGrid() = default;
   explicit SampleGrid(std::span<const ColorCount> colors);
 
-  /// Squared distances to the n nearest samples (counts included), ascending; fewer where there are fewer samples.
-  std::vector<int> nearest(Rgb color, int n) const;
+  /// Squared distances to the n nearest samples (counts included) that are at most `limit`, ascending.
+  std::vector<int> nearest(Rgb color, int n, int limit) const;
 
  private:
   static constexpr int kSide = 32;

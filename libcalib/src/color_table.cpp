@@ -34,10 +34,9 @@ constexpr int kLeafColors = kLeaf * kLeaf * kLeaf;
 struct Samples {
   std::vector<float> x, y, z;
   std::vector<std::int32_t> count;
-  std::vector<float> distance;  ///< scratch: squared, doubled
 
   std::size_t size() const { return x.size(); }
-  void resize(std::size_t n) { x.resize(n), y.resize(n), z.resize(n), count.resize(n), distance.resize(n); }
+  void resize(std::size_t n) { x.resize(n), y.resize(n), z.resize(n), count.resize(n); }
 };
 
 struct Cube {
@@ -47,38 +46,52 @@ struct Cube {
   float half_diagonal() const { return std::sqrt(3.0f) * float(side - 1); }
 };
 
-/// Squared distance to the n-th nearest sample (counts included), or infinity; fills samples.distance.
-float nth_distance(Samples& samples, const Cube& cube, int n, std::vector<float>& best) {
+/// Squared distance to the n-th nearest sample (counts included), or infinity; all of them go to `distance`.
+float nth_distance(const Samples& samples, const Cube& cube, int n, std::vector<float>& distance,
+                   std::vector<float>& best) {
   const float cx = cube.center(cube.x), cy = cube.center(cube.y), cz = cube.center(cube.z);
   const std::size_t size = samples.size();
-  float* const d = samples.distance.data();
-  const float *x = samples.x.data(), *y = samples.y.data(), *z = samples.z.data();
-#pragma GCC ivdep
-  for (std::size_t i = 0; i < size; ++i) {
-    const float dx = x[i] - cx, dy = y[i] - cy, dz = z[i] - cz;
-    d[i] = dx * dx + dy * dy + dz * dz;
-  }
+  if (distance.size() < size) distance.resize(size);
   best.assign(std::size_t(n), kInfinity);
   float worst = kInfinity;
-  for (std::size_t i = 0; i < size; ++i) {
-    if (!(d[i] < worst)) continue;
-    for (int c = samples.count[i]; c > 0 && d[i] < worst; --c) {
-      int slot = n - 1;
-      for (; slot > 0 && best[std::size_t(slot - 1)] > d[i]; --slot)
-        best[std::size_t(slot)] = best[std::size_t(slot - 1)];
-      best[std::size_t(slot)] = d[i];
-      worst = best.back();
+  float* const d = distance.data();
+  const float *x = samples.x.data(), *y = samples.y.data(), *z = samples.z.data();
+  constexpr std::size_t kPiece = 8;
+  for (std::size_t first = 0; first < size; first += kPiece) {
+    const std::size_t last = std::min(first + kPiece, size);
+    float least = kInfinity;
+    if (last - first == kPiece) {
+      for (std::size_t i = 0; i < kPiece; ++i) {
+        const float dx = x[first + i] - cx, dy = y[first + i] - cy, dz = z[first + i] - cz;
+        d[first + i] = dx * dx + dy * dy + dz * dz;
+      }
+      for (std::size_t i = 0; i < kPiece; ++i) least = std::min(least, d[first + i]);
+    } else {
+      for (std::size_t i = first; i < last; ++i) {
+        const float dx = x[i] - cx, dy = y[i] - cy, dz = z[i] - cz;
+        d[i] = dx * dx + dy * dy + dz * dz;
+        least = std::min(least, d[i]);
+      }
     }
+    if (!(least < worst)) continue;
+    for (std::size_t i = first; i < last; ++i)
+      for (int c = samples.count[i]; c > 0 && d[i] < worst; --c) {
+        int slot = n - 1;
+        for (; slot > 0 && best[std::size_t(slot - 1)] > d[i]; --slot)
+          best[std::size_t(slot)] = best[std::size_t(slot - 1)];
+        best[std::size_t(slot)] = d[i];
+        worst = best.back();
+      }
   }
   return worst;
 }
 
-void keep_within(const Samples& from, float squared_radius, Samples& to) {
+void keep_within(const Samples& from, const std::vector<float>& distance, float squared_radius, Samples& to) {
   to.resize(from.size());
   std::size_t n = 0;
   for (std::size_t i = 0; i < from.size(); ++i) {
     to.x[n] = from.x[i], to.y[n] = from.y[i], to.z[n] = from.z[i], to.count[n] = from.count[i];
-    n += from.distance[i] <= squared_radius;
+    n += distance[i] <= squared_radius;
   }
   to.resize(n);
 }
@@ -92,7 +105,7 @@ class Builder {
   }
 
   /// Decides a cube whose samples are among the given ones; `depth` counts halvings and names the scratch space.
-  void descend(const Cube& cube, Samples& foreground, Samples& background, int depth) {
+  void descend(const Cube& cube, const Samples& foreground, const Samples& background, int depth) {
     Samples &near_foreground = foreground_[std::size_t(depth)], &near_background = background_[std::size_t(depth)];
     if (!narrow(cube, foreground, background, near_foreground, near_background)) return;
     if (cube.side == kLeaf) return leaf(cube, near_foreground, near_background);
@@ -103,17 +116,17 @@ class Builder {
   }
 
   /// false: the cube has one answer, and it was filled. true: the samples that matter inside are in the last two.
-  bool narrow(const Cube& cube, Samples& foreground, Samples& background, Samples& near_foreground,
+  bool narrow(const Cube& cube, const Samples& foreground, const Samples& background, Samples& near_foreground,
               Samples& near_background) {
-    const float to_foreground = std::sqrt(nth_distance(foreground, cube, need_foreground_, best_));
-    const float to_background = std::sqrt(nth_distance(background, cube, need_background_, best_));
+    const float to_foreground = std::sqrt(nth_distance(foreground, cube, need_foreground_, to_foreground_, best_));
+    const float to_background = std::sqrt(nth_distance(background, cube, need_background_, to_background_, best_));
     const float r = cube.half_diagonal();
     constexpr float kRounding = 0.01f;
     if (to_foreground + 2 * r + kRounding < to_background) return fill(cube, true), false;
     if (to_background + 2 * r + kRounding < to_foreground) return fill(cube, false), false;
     const float radius = std::min(to_foreground, to_background) + 2 * r + kRounding;
-    keep_within(foreground, radius * radius, near_foreground);
-    keep_within(background, radius * radius, near_background);
+    keep_within(foreground, to_foreground_, radius * radius, near_foreground);
+    keep_within(background, to_background_, radius * radius, near_background);
     return true;
   }
 
@@ -188,7 +201,8 @@ class Builder {
 
   int need_foreground_, need_background_;
   std::uint64_t* table_;
-  std::vector<float> best_, nearest_foreground_, nearest_background_;
+  std::vector<float> best_, to_foreground_, to_background_;  // scratch of `narrow`
+  std::vector<float> nearest_foreground_, nearest_background_;
   std::array<Samples, 8> foreground_, background_;
 };
 
@@ -223,19 +237,15 @@ std::vector<std::uint64_t> build_color_table(std::span<const ColorCount> backgro
   std::array<Outer, 8> outer;
   parallel_for(job, outer.size(), [&](std::size_t i) {
     Builder builder(need_foreground, need_background, table.data());
-    Samples near_all_foreground = all_foreground, near_all_background = all_background;
     const Cube cube{int(i >> 2 & 1) * kOuter, int(i >> 1 & 1) * kOuter, int(i & 1) * kOuter, kOuter};
-    outer[i].open =
-        builder.narrow(cube, near_all_foreground, near_all_background, outer[i].foreground, outer[i].background);
+    outer[i].open = builder.narrow(cube, all_foreground, all_background, outer[i].foreground, outer[i].background);
   });
   parallel_for(job, 512, [&](std::size_t i) {
     const int x = int(i >> 6 & 7), y = int(i >> 3 & 7), z = int(i & 7);
     const Outer& from = outer[std::size_t((x >> 2) * 4 + (y >> 2) * 2 + (z >> 2))];
     if (!from.open) return;
-    thread_local Samples foreground_of_outer, background_of_outer;
-    foreground_of_outer = from.foreground, background_of_outer = from.background;
     Builder builder(need_foreground, need_background, table.data());
-    builder.descend({x * kInner, y * kInner, z * kInner, kInner}, foreground_of_outer, background_of_outer, 0);
+    builder.descend({x * kInner, y * kInner, z * kInner, kInner}, from.foreground, from.background, 0);
   });
   return table;
 }

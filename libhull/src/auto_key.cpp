@@ -11,6 +11,8 @@
 namespace lumihull::hull {
 namespace {
 
+constexpr double kSpeck = 2e-4, kHole = 1e-4;  // of the picture; what `clean` takes away and fills
+
 [[noreturn]] void fail(const std::string& message) { throw Error(ErrorCode::invalid_argument, message, "key options"); }
 
 calib::ColorKey train(const std::vector<calib::ColorCount>& background, const KeyOptions& options, Job& job) {
@@ -60,16 +62,29 @@ calib::ColorKey key_of_regions(const Capture& capture, const KeyOptions& options
   return train(histogram.counts(), options, job);
 }
 
-/// Sets to background what is outside the frame or outside a coarse silhouette.
-void confine(Image& mask, const calib::Frame& frame, const Image* coarse, int step) {
+/// Sets to background what is in the scan's frame, or where the object can't be.
+void confine(Image& mask, const Image& photo, const Capture& capture, std::size_t shot, const LearnedKey& learned) {
+  CoarseView view;
+  view.step = thinning_step(photo.width(), photo.height());
+  std::optional<Image> near;
+  if (learned.hull && capture.positioned(shot)) {
+    view.view = capture.view(shot);
+    view.mask = Image(std::max(1, photo.width() / view.step), std::max(1, photo.height() / view.step), 1);
+    near = learned.hull->silhouette(view, learned.hull->margin_px(view));
+  }
+  const calib::Frame frame = calib::find_frame(photo);
   for (int y = 0; y < mask.height(); ++y) {
     std::uint8_t* row = mask.row<std::uint8_t>(y);
-    const std::uint8_t* near = coarse ? coarse->row<std::uint8_t>(std::min(y / step, coarse->height() - 1)) : nullptr;
-    for (int x = 0; x < mask.width(); ++x) {
-      const bool inside = y >= frame.y0 && y < frame.y1 && x >= frame.x0 && x < frame.x1 &&
-                          (!near || near[std::min(x / step, coarse->width() - 1)]);
-      if (!inside) row[x] = 0;
+    if (y < frame.y0 || y >= frame.y1) {
+      std::fill(row, row + mask.width(), std::uint8_t(0));
+      continue;
     }
+    std::fill(row, row + frame.x0, std::uint8_t(0));
+    std::fill(row + frame.x1, row + mask.width(), std::uint8_t(0));
+    if (!near) continue;
+    const std::uint8_t* can_be = near->row<std::uint8_t>(std::min(y / view.step, near->height() - 1));
+    for (int first = 0, i = 0; first < mask.width(); first += view.step, i = std::min(i + 1, near->width() - 1))
+      if (!can_be[i]) std::fill(row + first, row + std::min(first + view.step, mask.width()), std::uint8_t(0));
   }
 }
 
@@ -125,23 +140,19 @@ KeyReport key_capture(Capture& capture, const KeyOptions& options, Job& job) {
       job, todo.size(),
       [&](std::size_t i) {
         const std::size_t shot = todo[i];
-        const Image photo = calib::keyable(capture.read_photo(shot));
+        Image photo = capture.read_photo(shot);
+        if (photo.type() != PixelType::u8) photo = calib::keyable(photo);
         const double pixels = double(photo.width()) * photo.height();
-        calib::KeyImageOptions how{calib::EdgeMode::hard, 0, 0};
-        Image mask = calib::key_image(*key, photo, how);
-        if (learned) {
-          CoarseView view;
-          view.step = thinning_step(photo.width(), photo.height());
-          std::optional<Image> near;
-          if (learned->hull && capture.positioned(shot)) {
-            view.view = capture.view(shot);
-            view.mask = Image(std::max(1, photo.width() / view.step), std::max(1, photo.height() / view.step), 1);
-            near = learned->hull->silhouette(view, learned->hull->margin_px(view));
-          }
-          confine(mask, calib::find_frame(photo), near ? &*near : nullptr, view.step);
+        const int speck = options.clean ? int(kSpeck * pixels) : 0, hole = options.clean ? int(kHole * pixels) : 0;
+        Image mask;
+        if (!learned) {
+          mask = calib::key_image(*key, photo, {options.edges, speck, hole});
+        } else {
+          mask = calib::key_image(*key, photo, {calib::EdgeMode::hard, 0, 0});
+          confine(mask, photo, capture, shot, *learned);
+          calib::clean_mask(mask, speck, hole);
+          calib::soften_edges(mask, photo, options.edges);
         }
-        if (options.clean) calib::clean_mask(mask, int(pixels * 2e-4), int(pixels * 1e-4));
-        calib::soften_edges(mask, photo, options.edges);
         std::size_t object = 0;
         for (int y = 0; y < mask.height(); ++y) {
           const std::uint8_t* row = mask.row<std::uint8_t>(y);
