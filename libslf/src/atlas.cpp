@@ -235,6 +235,8 @@ int pack(std::vector<Chart>& charts, int width) {
 Atlas make_atlas(const hull::Mesh& mesh, double texel_size, int max_side) {
   Eigen::AlignedBox3f box;
   for (const auto& v : mesh.vertices) box.extend(v);
+  // An object smaller than a pixel still gets some texels.
+  texel_size = std::min(texel_size, 0.125 * double(box.diagonal().norm()));
   for (;; texel_size *= 1.15) {
     if (texel_size > box.diagonal().norm())
       throw Error(ErrorCode::invalid_argument, "the mesh of " + std::to_string(mesh.triangles.size()) +

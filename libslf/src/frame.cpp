@@ -16,7 +16,7 @@ constexpr int kTileSide = 32;
 
 struct Level {
   int width, height;
-  std::vector<std::array<float, 4>> cells;  // premultiplied linear colour and weight
+  std::vector<std::array<float, 4>> cells;  // premultiplied colour and weight
 };
 
 Level halved(const Level& fine) {
@@ -93,7 +93,7 @@ std::vector<SurfaceSample> Frame::trace(const Tile& tile, const hull::RayScene& 
 }
 
 void Frame::resolve(const Tile& tile, const std::vector<SurfaceSample>& samples,
-                    const std::vector<LinearColor>& colors) {
+                    const std::vector<BlendColor>& colors) {
   const int per_pixel = options_.rays * options_.rays;
   const std::size_t tile_index = std::size_t(tile.y0 / kTileSide) * columns_ + tile.x0 / kTileSide;
   for (std::size_t first = 0; first < samples.size();) {
@@ -110,9 +110,9 @@ void Frame::resolve(const Tile& tile, const std::vector<SurfaceSample>& samples,
     const int x = tile.x0 + int(pixel) % tile.width, y = tile.y0 + int(pixel) / tile.width;
     std::uint8_t* out = out_.rgba.row<std::uint8_t>(y) + 4 * x;
     if (known) {
-      out[0] = srgb8_of_linear(r / float(known));
-      out[1] = srgb8_of_linear(g / float(known));
-      out[2] = srgb8_of_linear(b / float(known));
+      out[0] = srgb8_of_unit(r / float(known));
+      out[1] = srgb8_of_unit(g / float(known));
+      out[2] = srgb8_of_unit(b / float(known));
     } else {
       holes_[tile_index].push_back(std::uint32_t(y) * std::uint32_t(view_.camera.width) + std::uint32_t(x));
     }
@@ -128,7 +128,6 @@ Rendering Frame::finish() {
   if (holes.empty()) return std::move(out_);
 
   // Push-pull (Gortler et al. 1996, section 3.4): means over ever larger squares, until each hole finds a colour.
-  const auto& linear = linear_of_srgb8();
   std::vector<Level> levels;
   levels.push_back({out_.rgba.width(), out_.rgba.height(), {}});
   levels[0].cells.assign(std::size_t(out_.rgba.width()) * out_.rgba.height(), {0, 0, 0, 0});
@@ -136,8 +135,8 @@ Rendering Frame::finish() {
     const std::uint8_t* p = out_.rgba.row<std::uint8_t>(y);
     for (int x = 0; x < out_.rgba.width(); ++x) {
       const float w = float(p[4 * x + 3]) / 255;
-      levels[0].cells[std::size_t(y) * out_.rgba.width() + x] = {w * linear[p[4 * x]], w * linear[p[4 * x + 1]],
-                                                                 w * linear[p[4 * x + 2]], w};
+      levels[0].cells[std::size_t(y) * out_.rgba.width() + x] = {
+          w * unit_of_srgb8(p[4 * x]), w * unit_of_srgb8(p[4 * x + 1]), w * unit_of_srgb8(p[4 * x + 2]), w};
     }
   }
   for (const std::uint32_t hole : holes) levels[0].cells[hole] = {0, 0, 0, 0};
@@ -161,7 +160,7 @@ Rendering Frame::finish() {
       const float share = std::min(1.0f, (1 - sum[3]) / std::max(here[3], 1e-12f));
       for (int k = 0; k < 4; ++k) sum[k] += share * here[k];
     }
-    for (int c = 0; c < 3; ++c) out[c] = sum[3] > 0 ? srgb8_of_linear(sum[c] / sum[3]) : 128;
+    for (int c = 0; c < 3; ++c) out[c] = sum[3] > 0 ? srgb8_of_unit(sum[c] / sum[3]) : 128;
   }
   return std::move(out_);
 }

@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "color.h"
+
 namespace lumihull::slf {
 
 /// One ray's meeting with the surface.
@@ -19,11 +21,6 @@ struct SurfaceSample {
 
 struct Tile {
   int x0, y0, width, height;
-};
-
-/// Linear light; weight > 0 where the colour is known.
-struct LinearColor {
-  float r = 0, g = 0, b = 0, weight = 0;
 };
 
 /// A view cut into tiles, each with n x n rays a pixel, and the pictures that come of it. Tiles may be traced and
@@ -42,7 +39,7 @@ class Frame {
 
   /// Averages the samples' colours (colors.size() == samples.size()) into the tile's pixels. Pixels of which no sample
   /// has a weight are left to `finish`.
-  void resolve(const Tile& tile, const std::vector<SurfaceSample>& samples, const std::vector<LinearColor>& colors);
+  void resolve(const Tile& tile, const std::vector<SurfaceSample>& samples, const std::vector<BlendColor>& colors);
 
   /// Colours the pixels without colour from those around them and hands out the pictures.
   Rendering finish();

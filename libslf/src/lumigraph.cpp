@@ -32,7 +32,7 @@ struct Work {
   std::vector<Eigen::Vector3f> offsets;     // of each sample from its point
   std::vector<std::uint32_t> first_sample;  // of each point, and one past the last
   std::vector<BlendSource> sources;         // by photograph, then point
-  std::vector<LinearColor> sums;            // of each sample, weighted
+  std::vector<BlendColor> sums;             // of each sample, weighted
   std::size_t next_source = 0;
 };
 
@@ -95,7 +95,7 @@ struct Lumigraph::Impl {
         const Eigen::Vector2f px = source.pixel + source.jacobian * work.offsets[i];
         const PreparedPhoto::Sample c = photo.sample(px.x(), px.y());
         const float w = source.weight * c.weight;
-        LinearColor& sum = work.sums[i];
+        BlendColor& sum = work.sums[i];
         sum.r += w * c.r, sum.g += w * c.g, sum.b += w * c.b, sum.weight += w;
       }
     }
@@ -159,7 +159,7 @@ Rendering Lumigraph::render(const View& view, const RenderOptions& options, Job&
         job, works.size(),
         [&](std::size_t i) {
           Work& work = works[i];
-          for (LinearColor& c : work.sums)
+          for (BlendColor& c : work.sums)
             if (c.weight > 0) c = {c.r / c.weight, c.g / c.weight, c.b / c.weight, 1};
           frame.resolve(work.tile, work.samples, work.sums);
         },

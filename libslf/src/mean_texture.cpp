@@ -92,14 +92,14 @@ class Accumulator {
         for (const Seen& s : seen) {
           const PreparedPhoto::Sample c = photo.sample(s.pixel.x(), s.pixel.y());
           const float w = s.weight * c.weight;
-          LinearColor& sum = sums_[s.texel];
+          BlendColor& sum = sums_[s.texel];
           sum.r += w * c.r, sum.g += w * c.g, sum.b += w * c.b, sum.weight += w;
         }
       }
     });
   }
 
-  std::vector<LinearColor> take() { return std::move(sums_); }
+  std::vector<BlendColor> take() { return std::move(sums_); }
 
  private:
   struct Seen {
@@ -202,7 +202,7 @@ class Accumulator {
   const Atlas& atlas_;
   const TextureOptions& options_;
   std::vector<Eigen::Vector3f> normals_;
-  std::vector<LinearColor> sums_;
+  std::vector<BlendColor> sums_;
   float offset_ = 0;
   Eigen::Vector3f middle_;
 };
@@ -250,7 +250,7 @@ TexturedMesh mean_texture(const hull::Mesh& mesh, const PhotoSet& photos, const 
       job.advance();
     }
   }
-  std::vector<LinearColor> colors = accumulator.take();
+  std::vector<BlendColor> colors = accumulator.take();
   const std::size_t filled = fill_surface(mesh, atlas, colors);
 
   TexturedMesh textured;

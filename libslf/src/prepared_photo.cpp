@@ -145,7 +145,6 @@ PreparedPhoto::PreparedPhoto(const Photo& photo, const EdgeOptions& edge, const 
 }
 
 PreparedPhoto::Sample PreparedPhoto::sample(float u, float v) const {
-  const auto& linear = linear_of_srgb8();
   const float x = std::clamp(u - 0.5f, 0.0f, float(width_ - 1)), y = std::clamp(v - 0.5f, 0.0f, float(height_ - 1));
   const int x0 = std::min(int(x), width_ - 1), y0 = std::min(int(y), height_ - 1);
   const int x1 = std::min(x0 + 1, width_ - 1), y1 = std::min(y0 + 1, height_ - 1);
@@ -156,7 +155,7 @@ PreparedPhoto::Sample PreparedPhoto::sample(float u, float v) const {
   float r = 0, g = 0, bl = 0, sum = 0;
   for (int i = 0; i < 4; ++i) {
     const float w = b[i] * float(p[i]->weight);
-    r += w * linear[p[i]->r], g += w * linear[p[i]->g], bl += w * linear[p[i]->b];
+    r += w * unit_of_srgb8(p[i]->r), g += w * unit_of_srgb8(p[i]->g), bl += w * unit_of_srgb8(p[i]->b);
     sum += w;
   }
   const float scale = 1 / sum;  // weights are at least 1, the b sum to 1

@@ -11,8 +11,8 @@ namespace lumihull::slf {
 /// How the pixels next to a silhouette's edge count. They mix object and background, and the model's edge is never
 /// quite the photograph's.
 struct EdgeOptions {
-  float erosion_px = 1;  ///< pixels nearer to the background than this have next to no weight
-  float feather_px = 2;  ///< from there the weight rises to its full value over this width
+  float erosion_px = 0;  ///< pixels nearer to the background than this have next to no weight
+  float feather_px = 1;  ///< from there the weight rises to its full value over this width
 };
 
 /// A photograph ready for blending: sRGB with a weight of 1 … 255 in the fourth byte. Outside the object and in the
@@ -28,7 +28,7 @@ class PreparedPhoto {
   std::size_t bytes() const { return pixels_.size() * sizeof(Pixel); }
 
   struct Sample {
-    float r, g, b;  // linear light
+    float r, g, b;  // sRGB, 0 … 1
     float weight;   // 0 … 1, > 0
   };
   /// Bilinear, each of the four pixels weighted by its own weight too. (u, v): centre of the first pixel = (0.5, 0.5);

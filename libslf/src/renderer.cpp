@@ -21,7 +21,7 @@ Rendering render_with(const View& view, const RenderOptions& options, const hull
       [&](std::size_t i) {
         const Tile tile = frame.tile(i);
         const std::vector<SurfaceSample> samples = frame.trace(tile, scene, mesh);
-        std::vector<LinearColor> colors(samples.size());
+        std::vector<BlendColor> colors(samples.size());
         for (std::size_t s = 0; s < samples.size(); ++s) colors[s] = color_of(samples[s]);
         frame.resolve(tile, samples, colors);
       },
@@ -30,9 +30,8 @@ Rendering render_with(const View& view, const RenderOptions& options, const hull
   return frame.finish();
 }
 
-/// Bilinear in linear light; (u, v) in texels, the first one's centre at (0.5, 0.5).
-LinearColor sample_texture(const Image& texture, float u, float v) {
-  const auto& linear = linear_of_srgb8();
+/// Bilinear; (u, v) in texels, the first one's centre at (0.5, 0.5).
+BlendColor sample_texture(const Image& texture, float u, float v) {
   const int w = texture.width(), h = texture.height();
   const float x = std::clamp(u - 0.5f, 0.0f, float(w - 1)), y = std::clamp(v - 0.5f, 0.0f, float(h - 1));
   const int x0 = std::min(int(x), w - 1), y0 = std::min(int(y), h - 1);
@@ -41,8 +40,8 @@ LinearColor sample_texture(const Image& texture, float u, float v) {
   const std::uint8_t *top = texture.row<std::uint8_t>(y0), *bottom = texture.row<std::uint8_t>(y1);
   float c[3];
   for (int i = 0; i < 3; ++i) {
-    const float a = linear[top[3 * x0 + i]] * (1 - fx) + linear[top[3 * x1 + i]] * fx;
-    const float b = linear[bottom[3 * x0 + i]] * (1 - fx) + linear[bottom[3 * x1 + i]] * fx;
+    const float a = unit_of_srgb8(top[3 * x0 + i]) * (1 - fx) + unit_of_srgb8(top[3 * x1 + i]) * fx;
+    const float b = unit_of_srgb8(bottom[3 * x0 + i]) * (1 - fx) + unit_of_srgb8(bottom[3 * x1 + i]) * fx;
     c[i] = a * (1 - fy) + b * fy;
   }
   return {c[0], c[1], c[2], 1};
@@ -71,8 +70,8 @@ Rendering render_shaded(const hull::Mesh& mesh, const hull::RayScene& scene, con
         (normals[t[0]] + s.hit.b1 * (normals[t[1]] - normals[t[0]]) + s.hit.b2 * (normals[t[2]] - normals[t[0]]))
             .normalized();
     const float lit = std::abs(n.dot((eye - s.point).normalized()));
-    const float grey = 0.06f + 0.64f * lit;
-    return LinearColor{grey, grey, grey, 1};
+    const float grey = 0.25f + 0.6f * lit;
+    return BlendColor{grey, grey, grey, 1};
   });
 }
 

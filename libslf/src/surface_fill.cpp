@@ -13,11 +13,11 @@ namespace {
 constexpr int kSmoothing = 40;     // sweeps over the vertices without colour
 constexpr float kTrusted = 1e-4f;  // a sum of weights far below that of one ordinary view gives way to its surroundings
 
-void add(LinearColor& sum, const LinearColor& c, float w) {
+void add(BlendColor& sum, const BlendColor& c, float w) {
   sum.r += w * c.r, sum.g += w * c.g, sum.b += w * c.b, sum.weight += w;
 }
 
-LinearColor mean(const LinearColor& sum) { return {sum.r / sum.weight, sum.g / sum.weight, sum.b / sum.weight, 1}; }
+BlendColor mean(const BlendColor& sum) { return {sum.r / sum.weight, sum.g / sum.weight, sum.b / sum.weight, 1}; }
 
 struct Adjacency {
   std::vector<std::uint32_t> first, neighbour;  // neighbours of v: neighbour[first[v]] … neighbour[first[v + 1] - 1]
@@ -38,18 +38,18 @@ Adjacency adjacency_of(const hull::Mesh& mesh) {
 }
 
 /// Spreads the colours of vertices with weight > 0 to all the others.
-void spread(const hull::Mesh& mesh, std::vector<LinearColor>& vertices) {
+void spread(const hull::Mesh& mesh, std::vector<BlendColor>& vertices) {
   const Adjacency adjacency = adjacency_of(mesh);
   std::vector<std::uint32_t> unknown;  // in the order in which the colour reaches them
   std::vector<std::uint32_t> front;
-  LinearColor all;
+  BlendColor all;
   for (std::uint32_t v = 0; v < vertices.size(); ++v)
     if (vertices[v].weight > 0) front.push_back(v), add(all, vertices[v], 1);
-  const LinearColor fallback = all.weight > 0 ? mean(all) : LinearColor{0.2f, 0.2f, 0.2f, 1};
-  const auto mean_around = [&](std::uint32_t v, LinearColor& out) {
-    LinearColor sum;
+  const BlendColor fallback = all.weight > 0 ? mean(all) : BlendColor{0.2f, 0.2f, 0.2f, 1};
+  const auto mean_around = [&](std::uint32_t v, BlendColor& out) {
+    BlendColor sum;
     for (std::uint32_t k = adjacency.first[v]; k < adjacency.first[v + 1]; ++k) {
-      const LinearColor& c = vertices[adjacency.neighbour[k]];
+      const BlendColor& c = vertices[adjacency.neighbour[k]];
       if (c.weight > 0) add(sum, c, 1);
     }
     if (sum.weight > 0) out = mean(sum);
@@ -61,7 +61,7 @@ void spread(const hull::Mesh& mesh, std::vector<LinearColor>& vertices) {
         if (!(vertices[adjacency.neighbour[k]].weight > 0)) next.push_back(adjacency.neighbour[k]);
     std::sort(next.begin(), next.end());
     next.erase(std::unique(next.begin(), next.end()), next.end());
-    std::vector<LinearColor> colors(next.size());
+    std::vector<BlendColor> colors(next.size());
     for (std::size_t i = 0; i < next.size(); ++i) mean_around(next[i], colors[i]);
     for (std::size_t i = 0; i < next.size(); ++i) vertices[next[i]] = colors[i];
     unknown.insert(unknown.end(), next.begin(), next.end());
@@ -69,29 +69,29 @@ void spread(const hull::Mesh& mesh, std::vector<LinearColor>& vertices) {
   }
   for (int sweep = 0; sweep < kSmoothing; ++sweep)
     for (const std::uint32_t v : unknown) mean_around(v, vertices[v]);
-  for (LinearColor& c : vertices)
+  for (BlendColor& c : vertices)
     if (!(c.weight > 0)) c = fallback;
 }
 
 }  // namespace
 
-std::size_t fill_surface(const hull::Mesh& mesh, const Atlas& atlas, std::vector<LinearColor>& texels) {
-  std::vector<LinearColor> vertices(mesh.vertices.size());
+std::size_t fill_surface(const hull::Mesh& mesh, const Atlas& atlas, std::vector<BlendColor>& texels) {
+  std::vector<BlendColor> vertices(mesh.vertices.size());
   const auto shares = [&](const Texel& t) { return std::array<float, 3>{1 - t.b1 - t.b2, t.b1, t.b2}; };
   for (std::size_t i = 0; i < texels.size(); ++i) {
     if (!(texels[i].weight > kTrusted)) continue;
-    const LinearColor c = mean(texels[i]);
+    const BlendColor c = mean(texels[i]);
     const auto b = shares(atlas.texels[i]);
     for (int k = 0; k < 3; ++k) add(vertices[mesh.triangles[atlas.texels[i].triangle][k]], c, b[k]);
   }
-  for (LinearColor& c : vertices)
+  for (BlendColor& c : vertices)
     if (c.weight > 0) c = mean(c);
   spread(mesh, vertices);
 
   std::size_t filled = 0;
   for (std::size_t i = 0; i < texels.size(); ++i) {
     const auto b = shares(atlas.texels[i]);
-    LinearColor around;
+    BlendColor around;
     for (int k = 0; k < 3; ++k) add(around, vertices[mesh.triangles[atlas.texels[i].triangle][k]], b[k]);
     filled += !(texels[i].weight > kTrusted);
     add(texels[i], mean(around), texels[i].weight > kTrusted ? 0.01f * kTrusted : kTrusted);
@@ -100,10 +100,10 @@ std::size_t fill_surface(const hull::Mesh& mesh, const Atlas& atlas, std::vector
   return filled;
 }
 
-Image texture_picture(const Atlas& atlas, const std::vector<LinearColor>& texels) {
+Image texture_picture(const Atlas& atlas, const std::vector<BlendColor>& texels) {
   struct Level {
     int width, height;
-    std::vector<LinearColor> cells;
+    std::vector<BlendColor> cells;
   };
   std::vector<Level> levels;
   levels.push_back({atlas.width, atlas.height, {}});
@@ -116,10 +116,10 @@ Image texture_picture(const Atlas& atlas, const std::vector<LinearColor>& texels
     coarse.cells.resize(std::size_t(coarse.width) * coarse.height);
     for (int y = 0; y < fine.height; ++y)
       for (int x = 0; x < fine.width; ++x) {
-        const LinearColor& c = fine.cells[std::size_t(y) * fine.width + x];
+        const BlendColor& c = fine.cells[std::size_t(y) * fine.width + x];
         if (c.weight > 0) add(coarse.cells[std::size_t(y / 2) * coarse.width + x / 2], c, 1);
       }
-    for (LinearColor& c : coarse.cells)
+    for (BlendColor& c : coarse.cells)
       if (c.weight > 0) c = mean(c);
     levels.push_back(std::move(coarse));
   }
@@ -128,7 +128,7 @@ Image texture_picture(const Atlas& atlas, const std::vector<LinearColor>& texels
     const Level& coarse = levels[l + 1];
     for (int y = 0; y < fine.height; ++y)
       for (int x = 0; x < fine.width; ++x) {
-        LinearColor& c = fine.cells[std::size_t(y) * fine.width + x];
+        BlendColor& c = fine.cells[std::size_t(y) * fine.width + x];
         if (!(c.weight > 0)) c = coarse.cells[std::size_t(y / 2) * coarse.width + x / 2];
       }
   }
@@ -136,8 +136,8 @@ Image texture_picture(const Atlas& atlas, const std::vector<LinearColor>& texels
   for (int y = 0; y < atlas.height; ++y) {
     std::uint8_t* out = picture.row<std::uint8_t>(y);
     for (int x = 0; x < atlas.width; ++x) {
-      const LinearColor& c = levels[0].cells[std::size_t(y) * atlas.width + x];
-      out[3 * x] = srgb8_of_linear(c.r), out[3 * x + 1] = srgb8_of_linear(c.g), out[3 * x + 2] = srgb8_of_linear(c.b);
+      const BlendColor& c = levels[0].cells[std::size_t(y) * atlas.width + x];
+      out[3 * x] = srgb8_of_unit(c.r), out[3 * x + 1] = srgb8_of_unit(c.g), out[3 * x + 2] = srgb8_of_unit(c.b);
     }
   }
   return picture;

@@ -13,14 +13,14 @@
 namespace lumihull::slf {
 
 struct LumigraphOptions {
-  int photographs = 4;              ///< blended at a point, 1 … 16
-  double angle_power = 1;           ///< weights fall like 1 / angle^power; >= 0
-  double resolution_penalty = 0.1;  ///< radians of angle that a photograph of half the resolution is put back; >= 0
+  int photographs = 3;               ///< blended at a point, 1 … 16
+  double angle_power = 3;            ///< weights fall like 1 / angle^power; >= 0
+  double resolution_penalty = 0.05;  ///< radians of angle that a photograph of half the resolution is put back; >= 0
   double visibility_offset =
       0.003;                ///< how far beside the surface a shadow starts to count, in diagonals of the mesh's box
   double min_cosine = 0.1;  ///< photographs that see the surface flatter than this fade out, 0 … 1
-  double erosion_px = 1;    ///< rim of the photographs' silhouettes that counts next to nothing, px
-  double feather_px = 2;    ///< width over which the weight rises to full inside of it, px
+  double erosion_px = 0;    ///< rim of the photographs' silhouettes that counts next to nothing, px
+  double feather_px = 1;    ///< width over which the weight rises to full inside of it, px
   double border_px = 8;     ///< width over which a photograph fades out at its picture's border, px
   std::size_t cache_bytes = std::size_t(2) << 30;  ///< memory for decoded photographs (4 bytes a pixel each)
 };
@@ -32,7 +32,7 @@ struct LumigraphOptions {
 ///     penalty_i = angle between the new ray and photograph i's ray + resolution penalty
 ///     weight_i  = (1 - penalty_i / penalty_{k+1}) / penalty_i^power x border x cosine x soft silhouette
 ///
-/// are mixed in linear light: a photograph's weight is zero before another takes its place, so that nothing jumps where
+/// are mixed, as sRGB values: a photograph's weight is zero before another takes its place, so that nothing jumps where
 /// the camera moves; and a view from where a photograph was taken is that photograph.
 class LUMIHULL_API Lumigraph {
  public:

@@ -23,8 +23,8 @@ struct Rendering {
                 ///< where none hit; empty unless asked for
 };
 
-/// Renders a textured mesh from any camera, with its lens distortion. Colours are averaged over a pixel's rays in
-/// linear light. `scene` must be made from textured.mesh. Errors: invalid_argument (options, camera), cancelled.
+/// Renders a textured mesh from any camera, with its lens distortion. Colours are averaged over a pixel's rays as
+/// sRGB values. `scene` must be made from textured.mesh. Errors: invalid_argument (options, camera), cancelled.
 LUMIHULL_API Rendering render_texture(const TexturedMesh& textured, const hull::RayScene& scene, const View& view,
                                       const RenderOptions& options, Job& job);
 

@@ -27,14 +27,14 @@ LUMIHULL_API void validate(const TexturedMesh& textured, const std::string& name
 
 struct TextureOptions {
   int max_side = 4096;          ///< largest width and height of the texture, 64 … 16384
-  double texel_px = 1;          ///< size of a texel in pixels of the photographs, at the median over the surface
-  double cosine_power = 2;      ///< a photograph's weight falls with cosine^power of its viewing angle; >= 0
+  double texel_px = 0.7;        ///< size of a texel in pixels of the photographs, at the median over the surface
+  double cosine_power = 3;      ///< a photograph's weight falls with cosine^power of its viewing angle; >= 0
   double resolution_power = 1;  ///< ... and with depth^(-2 power): nearer photographs count more; >= 0
   double min_cosine = 0.15;     ///< flatter views are not used where there is any other; 0 … 1
   double visibility_offset =
       0.003;              ///< how far beside the surface a shadow starts to count, in diagonals of the mesh's box
-  double erosion_px = 1;  ///< rim of the photographs' silhouettes that counts next to nothing, px
-  double feather_px = 2;  ///< width over which the weight rises to full inside of it, px
+  double erosion_px = 0;  ///< rim of the photographs' silhouettes that counts next to nothing, px
+  double feather_px = 1;  ///< width over which the weight rises to full inside of it, px
 };
 
 /// What mean_texture found out on its way.
@@ -44,7 +44,7 @@ struct TextureReport {
   double filled_share = 0;  ///< share of the surface texels that no photograph saw
 };
 
-/// Gives a mesh a texture: the weighted mean in linear light, over the photographs that see it, of every texel.
+/// Gives a mesh a texture: the weighted mean (of sRGB values), over the photographs that see it, of every texel.
 ///
 /// Places that nobody saw take the colours around them on the surface. Photographs are read once each, one after the
 /// other, so that memory does not grow with their number: about 48 bytes a texel.
