@@ -4,7 +4,6 @@
 #include <lumihull/rig/rig_capture.h>
 
 #include <CLI/CLI.hpp>
-
 #include <csignal>
 #include <cstdio>
 #include <map>

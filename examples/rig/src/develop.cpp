@@ -1,13 +1,13 @@
 #include "develop.h"
 
-#include "noise.h"
-
 #include <lumihull/base/parallel.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
+
+#include "noise.h"
 
 namespace lumihull::rig {
 
@@ -65,7 +65,8 @@ Image develop(const Image& light, const PhotoOptions& options, std::uint64_t see
       std::uint8_t* out = picture.row<std::uint8_t>(int(y));
       for (std::size_t i = 0; i < values; ++i) {
         float x = std::max(0.f, in[i] * gain);
-        if (shot > 0) x += std::sqrt(x * shot + read * read) * gaussian(mix(seed + (y * values + i) * 0xd1342543de82ef95ull));
+        if (shot > 0)
+          x += std::sqrt(x * shot + read * read) * gaussian(mix(seed + (y * values + i) * 0xd1342543de82ef95ull));
         out[i] = table[std::size_t(std::clamp(x, 0.f, 1.f) * 65535.f + .5f)];
       }
     }

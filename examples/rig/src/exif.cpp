@@ -1,8 +1,7 @@
 // Exif 2.3 (CIPA DC-008-2012): an APP1 segment that holds a little-endian TIFF of two directories.
 
-#include <lumihull/rig/exif.h>
-
 #include <lumihull/base/error.h>
+#include <lumihull/rig/exif.h>
 
 #include <cmath>
 #include <cstdint>
@@ -21,7 +20,9 @@ class Directory {
   void ascii(std::uint16_t tag, const std::string& text) {
     if (!text.empty()) fields_.push_back({tag, 2, std::uint32_t(text.size() + 1), text + '\0'});
   }
-  void bytes(std::uint16_t tag, const std::string& value) { fields_.push_back({tag, 7, std::uint32_t(value.size()), value}); }
+  void bytes(std::uint16_t tag, const std::string& value) {
+    fields_.push_back({tag, 7, std::uint32_t(value.size()), value});
+  }
   void number16(std::uint16_t tag, int value) {
     std::string s;
     put16(s, std::uint32_t(value));

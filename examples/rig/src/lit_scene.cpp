@@ -1,14 +1,14 @@
 #include "lit_scene.h"
 
-#include "material.h"
-#include "noise.h"
-#include "shading_mesh.h"
-
 #include <lumihull/base/error.h>
 #include <lumihull/base/parallel.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "material.h"
+#include "noise.h"
+#include "shading_mesh.h"
 
 namespace lumihull::rig {
 
@@ -46,9 +46,14 @@ Vector3f LightMap::at(float u, float v) const {
 }
 
 LitScene::LitScene(const Scene& scene, const LightOptions& options, Job& job)
-    : room_(scene.enclosure), lamps_(scene.lamps), ambient_(scene.ambient), center_(scene.center()), radius_(scene.radius()) {
-  if (options.ambient_rays < 1 || options.ambient_rays > 100'000 || options.lamp_rays < 1 || options.lamp_rays > 100'000 ||
-      options.floor_texels < 2 || options.floor_texels > 10'000 || !(options.vertex_spacing > 0))
+    : room_(scene.enclosure),
+      lamps_(scene.lamps),
+      ambient_(scene.ambient),
+      center_(scene.center()),
+      radius_(scene.radius()) {
+  if (options.ambient_rays < 1 || options.ambient_rays > 100'000 || options.lamp_rays < 1 ||
+      options.lamp_rays > 100'000 || options.floor_texels < 2 || options.floor_texels > 10'000 ||
+      !(options.vertex_spacing > 0))
     throw Error(ErrorCode::invalid_argument, "light options are out of range", "rig");
   offset_ = 1e-4f * (radius_ > 0 ? radius_ : scene.enclosure.radius);
   for (const Object& object : scene.objects) {
@@ -127,7 +132,8 @@ void LitScene::light_room(const LightOptions& options, Job& job) {
     for (int j = 0; j < map.rows; ++j)
       for (int i = 0; i < map.columns; ++i) {
         const auto [point, normal] = place(float(i) / float(map.columns - 1), float(j) / float(map.rows - 1));
-        nodes.push_back({{surface, 0, point, normal}, &map.values[std::size_t(j) * std::size_t(map.columns) + std::size_t(i)]});
+        nodes.push_back(
+            {{surface, 0, point, normal}, &map.values[std::size_t(j) * std::size_t(map.columns) + std::size_t(i)]});
       }
   };
   const int n = options.floor_texels;
@@ -234,13 +240,16 @@ Vector3f LitScene::room_radiance(const RoomHit& hit) const {
   };
   Vector3f light;
   switch (hit.surface) {
-    case Room::kCeiling: return e.ceiling;
+    case Room::kCeiling:
+      return e.ceiling;
     case Room::kFloor:
       light = std::max(std::fabs(p.x()), std::fabs(p.y())) < near_floor_
                   ? square(floor_near_, near_floor_)
                   : square(floor_far_, e.radius / std::cos(3.1415927f / float(e.panels)));
       break;
-    case Room::kPedestalTop: light = square(pedestal_top_, e.pedestal_radius); break;
+    case Room::kPedestalTop:
+      light = square(pedestal_top_, e.pedestal_radius);
+      break;
     case Room::kPedestalSide: {
       const float u = std::atan2(p.y(), p.x()) / 6.2831853f;
       light = pedestal_side_.at(u < 0 ? u + 1 : u, p.z() / e.pedestal_height);

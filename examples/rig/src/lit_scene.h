@@ -1,7 +1,5 @@
 #pragma once
 
-#include "room.h"
-
 #include <lumihull/base/job.h>
 #include <lumihull/hull/ray_scene.h>
 #include <lumihull/rig/photographer.h>
@@ -10,6 +8,8 @@
 #include <optional>
 #include <span>
 #include <vector>
+
+#include "room.h"
 
 namespace lumihull::rig {
 
@@ -49,7 +49,8 @@ class LitScene {
   void add(const Object& object, float vertex_spacing);
   void light_room(const LightOptions& options, Job& job);
   void light_objects(const LightOptions& options, Job& job);
-  Eigen::Vector3f lamps_at(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, int rays, std::uint64_t turn) const;
+  Eigen::Vector3f lamps_at(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, int rays,
+                           std::uint64_t turn) const;
   Eigen::Vector3f base_color(const Part& part, const hull::Hit& hit, const Eigen::Vector3f& point) const;
   bool blocked(const Eigen::Vector3f& point, const Eigen::Vector3f& way) const;
 

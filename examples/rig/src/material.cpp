@@ -1,9 +1,9 @@
 #include "material.h"
 
-#include "noise.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "noise.h"
 
 namespace lumihull::rig {
 
@@ -14,7 +14,7 @@ namespace {
 Vector3f lerp(const Vector3f& a, const Vector3f& b, float t) { return a + t * (b - a); }
 
 Vector3f pottery(const Material& m, const Vector3f& q) {
-  const float theta = std::atan2(q.y(), q.x()) / 6.2831853f;  // -0.5 … 0.5
+  const float theta = std::atan2(q.y(), q.x()) / 6.2831853f;    // -0.5 … 0.5
   const float z = q.z() + .004f * fractal_noise(q * 9, 2, 11);  // a hand-drawn line is never straight
   const float soft = .0035f;
   const auto band = [&](float from, float to) {
@@ -22,8 +22,14 @@ Vector3f pottery(const Material& m, const Vector3f& q) {
   };
   Vector3f color = m.colors[0];
   color = lerp(color, m.colors[2], band(.20f, .56f) * .92f);
-  for (const auto& [from, to] : {std::pair{.185f, .205f}, {.215f, .222f}, {.55f, .57f}, {.535f, .542f}, {.655f, .675f},
-                                 {.74f, .75f}, {.90f, .915f}, {.05f, .075f}})
+  for (const auto& [from, to] : {std::pair{.185f, .205f},
+                                 {.215f, .222f},
+                                 {.55f, .57f},
+                                 {.535f, .542f},
+                                 {.655f, .675f},
+                                 {.74f, .75f},
+                                 {.90f, .915f},
+                                 {.05f, .075f}})
     color = lerp(color, m.colors[1], band(from, to));
   // Two zigzags that cross into a row of diamonds, a dot in each.
   const float saw = std::fabs(std::fmod(theta * 9 + 10.f, 1.f) - .5f) * 2;  // 0 … 1
@@ -46,7 +52,8 @@ Vector3f pottery(const Material& m, const Vector3f& q) {
 Vector3f pattern_color(const Material& m, const Vector3f& q) {
   Vector3f color = m.colors[0];
   switch (m.pattern) {
-    case Pattern::plain: break;
+    case Pattern::plain:
+      break;
     case Pattern::checker: {
       // A thousandth off, so that faces at round coordinates do not flicker between two cells.
       const Eigen::Array3f c = ((q.array() + .001f) * 10).floor();
@@ -64,7 +71,9 @@ Vector3f pattern_color(const Material& m, const Vector3f& q) {
       color = lerp(m.colors[0], m.colors[1], std::clamp(.85f * smoothstep(.35f, 1.f, vein) + .3f * cloud, 0.f, 1.f));
       break;
     }
-    case Pattern::pottery: color = pottery(m, q); break;
+    case Pattern::pottery:
+      color = pottery(m, q);
+      break;
   }
   if (m.grain > 0) color *= 1 + m.grain * (fractal_noise(q * 45, 3, 9) + .5f * fractal_noise(q * 6, 2, 10));
   return color.cwiseMax(0.f).cwiseMin(1.f);

@@ -4,7 +4,6 @@
 // that pictures are the same for any number of threads.
 
 #include <Eigen/Core>
-
 #include <cmath>
 #include <cstdint>
 

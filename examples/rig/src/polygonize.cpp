@@ -35,8 +35,7 @@ Polygons polygonize(const Function& f, const Vector3f& low, const Vector3f& high
   const Eigen::Vector3i n = ((high - low) / cell).array().ceil().cast<int>() + 1;
   const auto index = [&](int x, int y, int z) { return (std::uint64_t(z) * n.y() + y) * n.x() + x; };
   const auto point = [&](std::uint64_t i) {
-    return Vector3f(low + cell * Vector3f(float(i % n.x()), float(i / n.x() % n.y()),
-                                          float(i / n.x() / n.y())));
+    return Vector3f(low + cell * Vector3f(float(i % n.x()), float(i / n.x() % n.y()), float(i / n.x() / n.y())));
   };
   const std::size_t count = std::size_t(n.x()) * n.y() * n.z();
   std::vector<float> values(count);
@@ -65,8 +64,7 @@ Polygons polygonize(const Function& f, const Vector3f& low, const Vector3f& high
     for (int y = 0; y + 1 < n.y(); ++y)
       for (int x = 0; x + 1 < n.x(); ++x) {
         int inside_corners = 0;
-        for (int c = 0; c < 8; ++c)
-          inside_corners += values[index(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2))] < 0;
+        for (int c = 0; c < 8; ++c) inside_corners += values[index(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2))] < 0;
         if (inside_corners == 0 || inside_corners == 8) continue;
         for (int path = 0; path < 6; ++path) {
           std::array<std::uint64_t, 4> corner;

@@ -3,7 +3,6 @@
 #include <lumihull/hull/mesh.h>
 
 #include <Eigen/Core>
-
 #include <functional>
 #include <vector>
 

@@ -1,10 +1,10 @@
-#include "obj_uv.h"
-
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
 #include <lumihull/rig/object.h>
 
 #include <cmath>
+
+#include "obj_uv.h"
 
 namespace lumihull::rig {
 
@@ -49,7 +49,8 @@ Object object_by_name(const std::string& name, double size) {
   const fs::path file = name;
   const std::string extension = file.extension().string();
   if (extension != ".obj" && extension != ".ply")
-    throw Error(ErrorCode::invalid_argument, "expected vase, bust, statue, box, sphere, or a mesh file (.obj, .ply)", name);
+    throw Error(ErrorCode::invalid_argument, "expected vase, bust, statue, box, sphere, or a mesh file (.obj, .ply)",
+                name);
   const bool obj = extension == ".obj";
   fs::path texture = file;
   texture.replace_extension(".png");

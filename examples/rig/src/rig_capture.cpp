@@ -1,18 +1,16 @@
-#include <lumihull/rig/rig_capture.h>
-
-#include "noise.h"
-
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
 #include <lumihull/base/parallel.h>
 #include <lumihull/rig/exif.h>
+#include <lumihull/rig/rig_capture.h>
 #include <lumihull/rig/trajectory.h>
-
-#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "noise.h"
 
 namespace lumihull::rig {
 
@@ -65,7 +63,8 @@ std::string name_of(const char* prefix, std::size_t i) {
   return name;
 }
 
-/// The robot takes a picture every ten seconds, beginning on a fixed morning: the clock is part of the truth, not of today.
+/// The robot takes a picture every ten seconds, beginning on a fixed morning: the clock is part of the truth, not of
+/// today.
 std::string clock(std::size_t shot) {
   const std::size_t s = 9 * 3600 + 10 * shot, day = s / 86400;
   char text[32];
@@ -81,15 +80,17 @@ void write_truth(const fs::path& folder, const Session& session, const std::vect
   json["version"] = 1;
   json["unit"] = "m";
   const Camera& c = session.camera;
-  json["camera"] = {{"width", c.width}, {"height", c.height}, {"f", c.f},   {"s", c.s},   {"skew", c.skew}, {"u0", c.u0},
-                    {"v0", c.v0},       {"k1", c.k1},         {"k2", c.k2}, {"k3", c.k3}, {"p1", c.p1},     {"p2", c.p2}};
+  json["camera"] = {{"width", c.width}, {"height", c.height}, {"f", c.f},   {"s", c.s},
+                    {"skew", c.skew},   {"u0", c.u0},         {"v0", c.v0}, {"k1", c.k1},
+                    {"k2", c.k2},       {"k3", c.k3},         {"p1", c.p1}, {"p2", c.p2}};
   json["object"] = {{"name", session.scene.objects[0].name}};
   const auto [low, high] = bounding_box(session.scene.objects[0].mesh);
   json["object"]["low"] = numbers(low);
   json["object"]["high"] = numbers(high);
   json["lamps"] = Json::array();
   for (const Lamp& lamp : session.scene.lamps)
-    json["lamps"].push_back({{"position", numbers(lamp.position)}, {"radius", lamp.radius}, {"intensity", numbers(lamp.intensity)}});
+    json["lamps"].push_back(
+        {{"position", numbers(lamp.position)}, {"radius", lamp.radius}, {"intensity", numbers(lamp.intensity)}});
   json["views"] = Json::array();
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto m = session.shots[i].matrix();
@@ -102,8 +103,9 @@ void write_truth(const fs::path& folder, const Session& session, const std::vect
 }
 
 /// Takes all photographs of one kind; truth masks where `masks` names a folder.
-std::vector<std::string> take(const Session& session, const Scene& scene, const std::vector<Pose>& shots, const RigOptions& o,
-                              const fs::path& folder, const char* prefix, const fs::path& masks, std::uint64_t seed, Job& job) {
+std::vector<std::string> take(const Session& session, const Scene& scene, const std::vector<Pose>& shots,
+                              const RigOptions& o, const fs::path& folder, const char* prefix, const fs::path& masks,
+                              std::uint64_t seed, Job& job) {
   std::vector<std::string> files(shots.size());
   if (shots.empty()) return files;
   const Photographer photographer(scene, o.light, job);
@@ -144,7 +146,8 @@ Taken take_all(const fs::path& folder, const RigOptions& o, Job& job) {
   taken.session = plan(o);
   const Session& s = taken.session;
   for (const char* sub : {"photos", "enclosure", "truth/masks"}) fs::create_directories(folder / sub);
-  taken.empty_files = take(s, s.scene.emptied(), s.empty_shots, o, folder / "enclosure", "empty_", {}, mix(o.seed, 4), job);
+  taken.empty_files =
+      take(s, s.scene.emptied(), s.empty_shots, o, folder / "enclosure", "empty_", {}, mix(o.seed, 4), job);
   taken.files = take(s, s.scene, s.shots, o, folder / "photos", "", folder / "truth" / "masks", mix(o.seed, 3), job);
   for (std::size_t i = 0; i < taken.files.size(); ++i) taken.names.push_back(name_of("", i));
   write_truth(folder / "truth", s, taken.names);

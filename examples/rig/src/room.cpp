@@ -1,11 +1,11 @@
 #include "room.h"
 
-#include "noise.h"
-
 #include <lumihull/base/error.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "noise.h"
 
 namespace lumihull::rig {
 
@@ -51,8 +51,7 @@ bool Room::pedestal_hit(const Vector3f& o, const Vector3f& d, RoomHit& out) cons
   if (!found && a > 0 && discriminant > 0 && c > 0) {
     const float t = (-b - std::sqrt(discriminant)) / a;
     const Vector3f p = o + t * d;
-    if (t > 0 && p.z() < h && p.z() > 0)
-      out = {kPedestalSide, t, p, Vector3f(p.x() / r, p.y() / r, 0)}, found = true;
+    if (t > 0 && p.z() < h && p.z() > 0) out = {kPedestalSide, t, p, Vector3f(p.x() / r, p.y() / r, 0)}, found = true;
   }
   return found;
 }
@@ -87,7 +86,7 @@ Vector3f Room::paint(const RoomHit& at) const {
   if (at.surface == kCeiling) return Vector3f::Zero();
   const Vector3f q = at.point / e.radius;
   const std::uint64_t seed = mix(e.seed, std::uint64_t(at.surface));
-  const float clouds = fractal_noise(q * 2.3f, 3, seed);
+  const float clouds = fractal_noise(q * 2.3f, 2, seed);
   const float grain = value_noise(q * 260, seed + 17);
   float shade = 1 + e.unevenness * (.75f * clouds + .10f * grain);
   if (at.surface >= kPanels) {

@@ -3,7 +3,6 @@
 #include <lumihull/rig/scene.h>
 
 #include <Eigen/Core>
-
 #include <array>
 #include <cstdint>
 

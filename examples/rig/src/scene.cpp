@@ -1,9 +1,9 @@
 #include <lumihull/rig/scene.h>
 
-#include "noise.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "noise.h"
 
 namespace lumihull::rig {
 
@@ -57,11 +57,11 @@ Scene make_scene(Object object, const Vector3f& paint, bool pedestal, std::uint6
     l.intensity = tint * strength * (l.position - center).squaredNorm();
     scene.lamps.push_back(l);
   };
-  lamp(-1.05f, 6.5f, 9.8f, .70f, .62f, {1.f, .96f, .90f});
-  lamp(-2.60f, 7.0f, 8.5f, 1.1f, .30f, {.92f, .97f, 1.f});
-  lamp(1.15f, 6.0f, 10.f, .80f, .38f, {1.f, .98f, .95f});
+  lamp(-1.05f, 7.5f, 7.2f, .70f, .76f, {1.f, .96f, .90f});
+  lamp(-2.60f, 7.6f, 6.6f, 1.1f, .36f, {.92f, .97f, 1.f});
+  lamp(1.15f, 7.0f, 7.8f, .80f, .46f, {1.f, .98f, .95f});
   // What bounces between painted walls takes on some of their colour.
-  scene.ambient = Vector3f::Constant(.13f) + .35f * paint;
+  scene.ambient = Vector3f::Constant(.15f) + .30f * paint;
   return scene;
 }
 

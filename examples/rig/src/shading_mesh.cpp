@@ -1,7 +1,6 @@
 #include "shading_mesh.h"
 
 #include <Eigen/Geometry>
-
 #include <cmath>
 #include <cstdint>
 #include <unordered_map>

@@ -3,7 +3,6 @@
 #include <lumihull/rig/object.h>
 
 #include <Eigen/Core>
-
 #include <array>
 #include <vector>
 

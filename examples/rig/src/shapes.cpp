@@ -1,17 +1,16 @@
-// The objects that are made by formula. Each is a smooth union of simple bodies in a frame where the object is about one
-// unit high, stands on z = 0 and looks towards -y.
-
-#include "noise.h"
-#include "polygonize.h"
+// The objects that are made by formula. Each is a smooth union of simple bodies in a frame where the object is about
+// one unit high, stands on z = 0 and looks towards -y.
 
 #include <lumihull/base/error.h>
 #include <lumihull/rig/object.h>
 
 #include <Eigen/Geometry>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
+
+#include "noise.h"
+#include "polygonize.h"
 
 namespace lumihull::rig {
 
@@ -39,9 +38,9 @@ float capsule(const Vector3f& p, const Vector3f& a, const Vector3f& b, float ra,
 }
 
 float vase_radius(float z) {
-  static constexpr float kProfile[][2] = {{-.1f, .19f}, {0, .19f},    {.05f, .165f}, {.18f, .27f}, {.40f, .335f},
-                                          {.60f, .28f}, {.76f, .15f}, {.87f, .135f}, {.96f, .185f}, {1.05f, .21f},
-                                          {1.2f, .21f}};
+  static constexpr float kProfile[][2] = {{-.1f, .19f},  {0, .19f},     {.05f, .165f}, {.18f, .27f},
+                                          {.40f, .335f}, {.60f, .28f},  {.76f, .15f},  {.87f, .135f},
+                                          {.96f, .185f}, {1.05f, .21f}, {1.2f, .21f}};
   std::size_t i = 1;
   while (i + 3 < std::size(kProfile) && z > kProfile[i + 1][0]) ++i;
   // Cubic Hermite with finite-difference slopes.
@@ -63,7 +62,7 @@ float vase(const Vector3f& p) {
   d = cut(d, z - 1, .02f);
   d = cut(d, -z, .02f);
   // The hollow neck: the hull can't see into it, as in life.
-  const float hollow = cut(.75f * (r - profile + .03f), .80f - z, .03f);
+  const float hollow = cut(.75f * (r - profile + .042f), .80f - z, .03f);
   d = cut(d, -hollow, .012f);
   // The handle: an elliptic ring in the plane y = 0, half of it inside the body.
   const float ex = (p.x() - .27f) / .17f, ez = (z - .655f) / .20f;
@@ -77,35 +76,35 @@ float bust(const Vector3f& p) {
   const Vector3f q(std::fabs(p.x()), p.y(), p.z());  // both halves are alike
   float d = ellipsoid(p, {0, .02f, .10f}, {.335f, .19f, .17f});
   d = blend(d, ellipsoid(p, {0, -.07f, .12f}, {.20f, .14f, .15f}), .06f);
-  d = blend(d, capsule(p, {0, .03f, .15f}, {0, .005f, .50f}, .105f, .088f), .09f);
-  d = blend(d, ellipsoid(p, {0, .01f, .74f}, {.172f, .205f, .225f}), .06f);      // skull
-  d = blend(d, ellipsoid(p, {0, -.075f, .60f}, {.115f, .115f, .14f}), .06f);    // jaw
-  d = blend(d, ellipsoid(p, {0, -.175f, .515f}, {.045f, .035f, .035f}), .04f);  // chin
+  d = blend(d, capsule(p, {0, .03f, .15f}, {0, .005f, .50f}, .122f, .104f), .09f);
+  d = blend(d, ellipsoid(p, {0, .01f, .74f}, {.172f, .205f, .225f}), .06f);              // skull
+  d = blend(d, ellipsoid(p, {0, -.075f, .60f}, {.115f, .115f, .14f}), .06f);             // jaw
+  d = blend(d, ellipsoid(p, {0, -.175f, .515f}, {.045f, .035f, .035f}), .04f);           // chin
   d = blend(d, capsule(p, {0, -.185f, .72f}, {0, -.245f, .645f}, .018f, .030f), .035f);  // nose
-  d = blend(d, ellipsoid(q, {.07f, -.165f, .745f}, {.06f, .03f, .022f}), .03f);  // brows
-  d = cut(d, -ellipsoid(q, {.075f, -.205f, .70f}, {.04f, .03f, .028f}), .03f);   // eye sockets
+  d = blend(d, ellipsoid(q, {.07f, -.165f, .745f}, {.06f, .03f, .022f}), .03f);          // brows
+  d = cut(d, -ellipsoid(q, {.075f, -.205f, .70f}, {.04f, .03f, .028f}), .03f);           // eye sockets
   d = blend(d, ellipsoid(q, {.07f, -.165f, .70f}, {.026f, .022f, .022f}), .01f);
   d = blend(d, ellipsoid(p, {0, -.195f, .583f}, {.05f, .022f, .013f}), .018f);  // lips
   d = blend(d, ellipsoid(p, {0, -.190f, .560f}, {.043f, .022f, .013f}), .018f);
   d = blend(d, ellipsoid(q, {.175f, .02f, .68f}, {.022f, .045f, .065f}), .02f);  // ears
-  d = blend(d, ellipsoid(p, {0, .20f, .83f}, {.085f, .075f, .085f}), .03f);     // a knot of hair
+  d = blend(d, ellipsoid(p, {0, .20f, .83f}, {.085f, .075f, .085f}), .03f);      // a knot of hair
   d += .006f * std::sin(60 * (p.z() + .35f * p.y())) * smoothstep(.80f, .86f, p.z() + .25f * p.y());
   return cut(d, -p.z(), .015f);
 }
 
 float statue(const Vector3f& p) {
   const Vector3f q(std::fabs(p.x()), p.y(), p.z());
-  float d = std::fmax(std::hypot(p.x(), p.y()) - .20f, std::fabs(p.z() - .03f) - .03f);      // plinth
-  d = blend(d, capsule(q, {.085f, 0, .06f}, {.055f, .01f, .46f}, .043f, .062f), .03f);       // legs
-  d = blend(d, ellipsoid(q, {.085f, -.05f, .075f}, {.038f, .075f, .03f}), .02f);             // feet
-  d = blend(d, ellipsoid(p, {0, .01f, .48f}, {.105f, .075f, .075f}), .04f);                  // hips
-  d = blend(d, capsule(p, {0, 0, .50f}, {0, -.005f, .70f}, .075f, .085f), .05f);             // trunk
-  d = blend(d, ellipsoid(p, {0, 0, .735f}, {.145f, .065f, .05f}), .05f);                     // shoulders
-  d = blend(d, capsule(q, {.14f, 0, .74f}, {.265f, .03f, .615f}, .036f, .030f), .03f);       // upper arms
-  d = blend(d, capsule(q, {.265f, .03f, .615f}, {.10f, -.02f, .50f}, .030f, .026f), .02f);   // forearms to the hips
-  d = blend(d, capsule(p, {0, 0, .76f}, {0, -.005f, .84f}, .038f, .036f), .03f);             // neck
-  d = blend(d, ellipsoid(p, {0, -.01f, .905f}, {.068f, .080f, .095f}), .02f);                // head
-  d = blend(d, ellipsoid(p, {0, .0f, .965f}, {.10f, .10f, .016f}), .01f);                    // hat
+  float d = std::fmax(std::hypot(p.x(), p.y()) - .20f, std::fabs(p.z() - .03f) - .03f);     // plinth
+  d = blend(d, capsule(q, {.085f, 0, .06f}, {.055f, .01f, .46f}, .043f, .062f), .03f);      // legs
+  d = blend(d, ellipsoid(q, {.085f, -.05f, .075f}, {.038f, .075f, .03f}), .02f);            // feet
+  d = blend(d, ellipsoid(p, {0, .01f, .48f}, {.105f, .075f, .075f}), .04f);                 // hips
+  d = blend(d, capsule(p, {0, 0, .50f}, {0, -.005f, .70f}, .075f, .085f), .05f);            // trunk
+  d = blend(d, ellipsoid(p, {0, 0, .735f}, {.145f, .065f, .05f}), .05f);                    // shoulders
+  d = blend(d, capsule(q, {.14f, 0, .74f}, {.265f, .03f, .615f}, .036f, .030f), .03f);      // upper arms
+  d = blend(d, capsule(q, {.265f, .03f, .615f}, {.10f, -.02f, .50f}, .030f, .026f), .02f);  // forearms to the hips
+  d = blend(d, capsule(p, {0, 0, .76f}, {0, -.005f, .84f}, .038f, .036f), .03f);            // neck
+  d = blend(d, ellipsoid(p, {0, -.01f, .905f}, {.068f, .080f, .095f}), .02f);               // head
+  d = blend(d, ellipsoid(p, {0, .0f, .965f}, {.10f, .10f, .016f}), .01f);                   // hat
   return cut(d, -p.z(), .01f);
 }
 
@@ -134,7 +133,8 @@ std::array<Vector3f, 2> bounding_box(const hull::Mesh& mesh) {
 
 Object make_vase(double size, int detail) {
   Object object = from_formula("vase", vase, {-.42f, -.42f, -.05f}, {.54f, .42f, 1.06f}, size, detail);
-  object.material = {Pattern::pottery, {{{.62f, .25f, .10f}, {.020f, .035f, .11f}, {.80f, .68f, .45f}}}, .2f, .045f, .30f};
+  object.material = {
+      Pattern::pottery, {{{.62f, .25f, .10f}, {.020f, .035f, .11f}, {.80f, .68f, .45f}}}, .2f, .045f, .30f};
   return object;
 }
 
@@ -180,7 +180,9 @@ Object make_sphere(double size, int subdivisions) {
   for (std::uint32_t a = 0; a < 12; ++a)
     for (std::uint32_t b = a + 1; b < 12; ++b)
       for (std::uint32_t c = b + 1; c < 12; ++c) {
-        const auto near = [&](std::uint32_t i, std::uint32_t j) { return (points[i] - points[j]).norm() < edge * 1.01; };
+        const auto near = [&](std::uint32_t i, std::uint32_t j) {
+          return (points[i] - points[j]).norm() < edge * 1.01;
+        };
         if (!near(a, b) || !near(b, c) || !near(a, c)) continue;
         const bool outwards = (points[b] - points[a]).cross(points[c] - points[a]).dot(points[a]) > 0;
         triangles.push_back(outwards ? std::array{a, b, c} : std::array{a, c, b});

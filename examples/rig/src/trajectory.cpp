@@ -1,11 +1,10 @@
-#include <lumihull/rig/trajectory.h>
-
-#include "noise.h"
-
 #include <lumihull/base/error.h>
+#include <lumihull/rig/trajectory.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "noise.h"
 
 namespace lumihull::rig {
 
@@ -25,7 +24,8 @@ Pose shot_at(const Hemisphere& h, int shot, double phi, double theta) {
   // Towards the pole: the picture's upper side, defined from straight above, too.
   const Vector3d up(-std::cos(phi) * std::cos(theta), -std::cos(phi) * std::sin(theta), std::sin(phi));
   const double wobble = h.jitter * h.radius;
-  const Vector3d eye = h.target + h.radius * out + wobble * Vector3d(random(h, shot, 0), random(h, shot, 1), random(h, shot, 2));
+  const Vector3d eye =
+      h.target + h.radius * out + wobble * Vector3d(random(h, shot, 0), random(h, shot, 1), random(h, shot, 2));
   const Vector3d aim = h.target + wobble * Vector3d(random(h, shot, 3), random(h, shot, 4), random(h, shot, 5));
   return look_at(eye, aim, up);
 }
@@ -33,8 +33,8 @@ Pose shot_at(const Hemisphere& h, int shot, double phi, double theta) {
 void check(int n, const Hemisphere& h) {
   if (n < 1 || n > 1'000'000 || !(h.radius > 0) || !(h.jitter >= 0 && h.jitter < .5) || !(h.phi_first >= 0) ||
       !(h.phi_last >= h.phi_first) || !(h.phi_last <= kPi))
-    throw Error(ErrorCode::invalid_argument, "expected at least one shot, a positive radius and 0 <= phi_first <= phi_last <= pi",
-                "trajectory");
+    throw Error(ErrorCode::invalid_argument,
+                "expected at least one shot, a positive radius and 0 <= phi_first <= phi_last <= pi", "trajectory");
 }
 
 }  // namespace
@@ -63,7 +63,8 @@ double framing_distance(const Camera& camera, double ball_radius, double fill) {
 
 std::vector<Pose> hemisphere_trajectory(int n, const Hemisphere& h) {
   check(n, h);
-  // Steps in phi: about sqrt(n / 3) so that steps in phi and theta are alike in the middle; a divisor of n, if one is near.
+  // Steps in phi: about sqrt(n / 3) so that steps in phi and theta are alike in the middle; a divisor of n, if one is
+  // near.
   const double ideal = std::max(1.0, std::sqrt(n / 3.0));
   int rows = std::max(1, int(std::lround(ideal)));
   for (int k = std::max(1, int(ideal * .7)); k <= int(std::ceil(ideal * 1.4)); ++k)

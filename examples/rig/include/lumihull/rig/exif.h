@@ -8,10 +8,10 @@ namespace lumihull::rig {
 /// What the virtual camera writes into its files.
 struct ExifTags {
   std::string make = "Lumihull", model = "Virtual Rig", lens = "18 mm";
-  std::string time;                 ///< "YYYY:MM:DD hh:mm:ss"
+  std::string time;  ///< "YYYY:MM:DD hh:mm:ss"
   double focal_length_mm = 18;
   double sensor_width_mm = 22.7;
-  int width = 0, height = 0;        ///< px
+  int width = 0, height = 0;  ///< px
   double exposure_s = 0.125;
   double f_number = 11;
   int iso = 100;

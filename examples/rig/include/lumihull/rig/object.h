@@ -4,7 +4,6 @@
 #include <lumihull/hull/mesh.h>
 
 #include <Eigen/Core>
-
 #include <array>
 #include <filesystem>
 #include <string>
@@ -26,25 +25,25 @@ struct Material {
   Pattern pattern = Pattern::plain;
   std::array<Eigen::Vector3f, 3> colors{Eigen::Vector3f(.5f, .5f, .5f), Eigen::Vector3f(.1f, .1f, .1f),
                                         Eigen::Vector3f(.05f, .05f, .05f)};
-  float grain = 0.15f;      ///< strength of fine noise on the colour, 0 … 1
+  float grain = 0.15f;       ///< strength of fine noise on the colour, 0 … 1
   float reflectance = .04f;  ///< mirror reflectance at normal incidence; 0: matt, .04: glaze, .6: metal
-  float roughness = .25f;   ///< GGX: alpha = roughness²; 0.05 … 1
+  float roughness = .25f;    ///< GGX: alpha = roughness²; 0.05 … 1
 };
 
 /// A thing to be photographed. z is up; it stands on z = 0, its axis through the origin; metres.
 struct Object {
   std::string name;
   hull::Mesh mesh;
-  std::vector<Eigen::Vector3f> normals;                  ///< one a vertex; empty: from the mesh, with creases at 35°
-  std::vector<std::array<Eigen::Vector2f, 3>> uv;        ///< one a triangle's corner, v upwards; empty: no texture
-  Image texture;                                         ///< 8-bit sRGB, 3 channels, or empty: `material.pattern`
+  std::vector<Eigen::Vector3f> normals;            ///< one a vertex; empty: from the mesh, with creases at 35°
+  std::vector<std::array<Eigen::Vector2f, 3>> uv;  ///< one a triangle's corner, v upwards; empty: no texture
+  Image texture;                                   ///< 8-bit sRGB, 3 channels, or empty: `material.pattern`
   Material material;
 };
 
 /// Objects made by formula, `size` metres along the longest side of their box, `detail` cells along it.
 /// vase: surface of revolution with ridges, hollow neck, handle (genus 1). bust: a glossy, nearly convex head.
-/// statue: a dark figure with its arms akimbo (genus 2). box: twelve triangles, checker. sphere: radius size / 2, vertices
-/// on it to float accuracy, 20 * 4^n triangles.
+/// statue: a dark figure with its arms akimbo (genus 2). box: twelve triangles, checker. sphere: radius size / 2,
+/// vertices on it to float accuracy, 20 * 4^n triangles.
 Object make_vase(double size, int detail = 100);
 Object make_bust(double size, int detail = 100);
 Object make_statue(double size, int detail = 130);

@@ -12,28 +12,29 @@ namespace lumihull::rig {
 
 /// How finely the light that does not depend on the camera is computed, once a scene.
 struct LightOptions {
-  int ambient_rays = 64;      ///< a vertex or texel
-  int lamp_rays = 12;         ///< a vertex or texel, for each lamp
-  int floor_texels = 160;     ///< along a side of the floor's light map; walls have a fifth of it
-  float vertex_spacing = .01f;  ///< triangles are split until their edges are shorter than this part of the object's size
+  int ambient_rays = 64;   ///< a vertex or texel
+  int lamp_rays = 12;      ///< a vertex or texel, for each lamp
+  int floor_texels = 160;  ///< along a side of the floor's light map; walls have a fifth of it
+  float vertex_spacing =
+      .01f;  ///< triangles are split until their edges are shorter than this part of the object's size
 };
 
 /// What happens between the lens and the file.
 struct PhotoOptions {
-  int rays = 2;               ///< rays x rays a pixel …
-  int edge_rays = 6;          ///< … and so many where the first ones disagree: outlines
-  double exposure = 1;        ///< radiance 1 / exposure is white
-  double full_well = 25000;   ///< electrons at white: shot noise. 0: none
-  double read_noise = 9;      ///< electrons
-  bool depth = false;         ///< fill Photo::depth
-  int reduce = 1;             ///< > 1: light is traced at 1/reduce of the size and enlarged bicubically; noise at full size
+  int rays = 2;              ///< rays x rays a pixel …
+  int edge_rays = 6;         ///< … and so many where the first ones disagree: outlines
+  double exposure = 1;       ///< radiance 1 / exposure is white
+  double full_well = 25000;  ///< electrons at white: shot noise. 0: none
+  double read_noise = 9;     ///< electrons
+  bool depth = false;        ///< fill Photo::depth
+  int reduce = 1;  ///< > 1: light is traced at 1/reduce of the size and enlarged bicubically; noise at full size
 };
 
 /// A photograph and the truth about it.
 struct Photo {
-  Image picture;              ///< 8-bit sRGB, 3 channels
-  Image mask;                 ///< 8-bit, 1 channel: the part of the pixel that objects cover, 255 = all
-  Image depth;                ///< f32, 1 channel: z in the camera's frame at the pixel's centre, m; 0: no object. Or empty
+  Image picture;  ///< 8-bit sRGB, 3 channels
+  Image mask;     ///< 8-bit, 1 channel: the part of the pixel that objects cover, 255 = all
+  Image depth;    ///< f32, 1 channel: z in the camera's frame at the pixel's centre, m; 0: no object. Or empty
 };
 
 /// Takes photographs of a scene. Light that does not depend on the camera (lamps with soft shadows, light from the

@@ -3,7 +3,6 @@
 #include <lumihull/rig/object.h>
 
 #include <Eigen/Core>
-
 #include <cstdint>
 #include <vector>
 
@@ -11,9 +10,9 @@ namespace lumihull::rig {
 
 /// A lamp with the shape of a sphere, fixed to the room.
 struct Lamp {
-  Eigen::Vector3f position{0, 0, 3};               ///< m
-  float radius = .15f;                             ///< m; softens shadows and highlights
-  Eigen::Vector3f intensity{1, 1, 1};              ///< a white surface at distance d, facing it, has radiance intensity / d²
+  Eigen::Vector3f position{0, 0, 3};   ///< m
+  float radius = .15f;                 ///< m; softens shadows and highlights
+  Eigen::Vector3f intensity{1, 1, 1};  ///< a white surface at distance d, facing it, has radiance intensity / d²
 };
 
 /// The room around the object: a prism of painted panels (paper, section 3.2: "many shades of green"), a painted floor,
@@ -22,22 +21,22 @@ struct Enclosure {
   int panels = 8;                                  ///< >= 3
   float radius = 3;                                ///< m, axis to panel
   float height = 3.3f;                             ///< m
-  Eigen::Vector3f color{.035f, .26f, .05f};        ///< mean paint, linear
+  Eigen::Vector3f color{.030f, .20f, .042f};       ///< mean paint, linear
   float unevenness = .22f;                         ///< spread of shade among panels and within one, 0 … 1
-  Eigen::Vector3f ceiling{.75f, .75f, .72f};       ///< radiance
+  Eigen::Vector3f ceiling{1.f, .99f, .96f};        ///< radiance
   float pedestal_radius = 0, pedestal_height = 0;  ///< m; 0: none. Round, painted like the rest
   std::uint64_t seed = 1;                          ///< of the paint
 };
 
-inline const Eigen::Vector3f kGreenPaint{.035f, .26f, .05f};
-inline const Eigen::Vector3f kBluePaint{.025f, .07f, .36f};
+inline const Eigen::Vector3f kGreenPaint{.030f, .20f, .042f};
+inline const Eigen::Vector3f kBluePaint{.022f, .055f, .27f};
 
 /// Everything that light falls on. Objects stand where their meshes are.
 struct Scene {
   std::vector<Object> objects;
   Enclosure enclosure;
   std::vector<Lamp> lamps;
-  Eigen::Vector3f ambient{.20f, .24f, .20f};       ///< light that paint receives from everywhere (many bounces)
+  Eigen::Vector3f ambient{.20f, .24f, .20f};  ///< light that paint receives from everywhere (many bounces)
 
   /// Centre and radius of a ball around all objects; (0,0,0) and 0 without objects.
   Eigen::Vector3f center() const;

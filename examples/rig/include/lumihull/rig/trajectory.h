@@ -4,14 +4,13 @@
 #include <lumihull/base/pose.h>
 
 #include <Eigen/Core>
-
 #include <cstdint>
 #include <vector>
 
 namespace lumihull::rig {
 
-/// Camera like the paper's (section 2.3): 6.3 megapixels, 18 mm lens on a sensor of 22.7 mm, `width` pixels wide and two
-/// thirds as high; with distortion about 1.5 % of barrel and a principal point off the centre.
+/// Camera like the paper's (section 2.3): 6.3 megapixels, 18 mm lens on a sensor of 22.7 mm, `width` pixels wide and
+/// two thirds as high; with distortion about 1.5 % of barrel and a principal point off the centre.
 Camera default_camera(int width = 3072, bool distortion = true);
 inline constexpr double kFocalLength_mm = 18, kSensorWidth_mm = 22.7;
 
@@ -21,13 +20,14 @@ double framing_distance(const Camera& camera, double ball_radius, double fill = 
 /// Where cameras go around a target; angles in radians, z up.
 struct Hemisphere {
   Eigen::Vector3d target{0, 0, 0};
-  double radius = 1;                   ///< m
+  double radius = 1;                         ///< m
   double phi_first = 0.12, phi_last = 1.45;  ///< polar angle: 0 = from above, pi/2 = from the side
-  double jitter = 0.01;                ///< how far a shot is from its commanded place: part of radius; also aim
+  double jitter = 0.01;                      ///< how far a shot is from its commanded place: part of radius; also aim
   std::uint64_t seed = 1;
 };
 
-/// `n` shots in a grid of phi x theta, one azimuth after another from top to bottom (paper, section 2.2); cam_from_world.
+/// `n` shots in a grid of phi x theta, one azimuth after another from top to bottom (paper, section 2.2);
+/// cam_from_world.
 std::vector<Pose> hemisphere_trajectory(int n, const Hemisphere& options);
 /// `n` shots at polar angle phi_last, evenly around.
 std::vector<Pose> ring_trajectory(int n, const Hemisphere& options);

@@ -1,0 +1,151 @@
+#include <lumihull/base/files.h>
+#include <lumihull/rig/rig_capture.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <sstream>
+
+#include "rig_support.h"
+
+namespace lumihull::rig {
+namespace {
+
+namespace fs = std::filesystem;
+
+RigOptions small() {
+  RigOptions o;
+  o.object = "box";
+  o.size_m = .3;
+  o.photos = 4, o.empty_photos = 2;
+  o.width = 90;
+  o.light = test::coarse_light();
+  return o;
+}
+
+TEST(RigCapture, IsACaptureWithTruthBeside) {
+  const test::TemporaryFolder folder;
+  Job job;
+  make_capture(folder / "box", small(), job);
+  const Capture capture = Capture::open(folder / "box");
+  ASSERT_EQ(capture.shots.size(), 4u);
+  EXPECT_EQ(capture.enclosure.size(), 2u);
+  EXPECT_EQ(capture.unit, Unit::metres);
+  ASSERT_EQ(capture.cameras.size(), 1u);
+  EXPECT_TRUE(capture.cameras[0].has_distortion());
+  const hull::Mesh mesh = hull::read_mesh(folder / "box" / "truth" / "mesh.ply");
+  for (std::size_t i = 0; i < 4; ++i) {
+    SCOPED_TRACE(i);
+    const Image photo = capture.read_photo(i);
+    const Image mask = read_image(folder / "box" / "truth" / "masks" / (capture.shots[i].name + ".png"));
+    ASSERT_EQ(mask.width(), 90);
+    // The box's corners, projected through the lens, bound the mask to a pixel.
+    Eigen::Array4d bounds(1e9, 1e9, -1e9, -1e9);
+    for (const auto& v : mesh.vertices) {
+      const auto px = capture.view(i).project(v.cast<double>());
+      ASSERT_TRUE(px);
+      bounds << bounds.head<2>().min(px->array()), bounds.tail<2>().max(px->array());
+    }
+    Eigen::Array4i seen(1 << 20, 1 << 20, -1, -1);
+    for (int y = 0; y < mask.height(); ++y)
+      for (int x = 0; x < mask.width(); ++x)
+        if (mask.row<std::uint8_t>(y)[x] > 0)
+          seen << std::min(seen[0], x), std::min(seen[1], y), std::max(seen[2], x + 1), std::max(seen[3], y + 1);
+    EXPECT_LT((seen.cast<double>() - bounds).abs().maxCoeff(), 1.3) << seen.transpose() << " / " << bounds.transpose();
+  }
+  EXPECT_EQ(read_image_info(capture.photo_path(capture.shots[1])).time, capture.shots[1].time);
+  EXPECT_EQ(capture.shots[1].time, "2007-08-01T09:00:10");
+}
+
+TEST(RigCapture, TheSameOptionsMakeTheSameBytes) {
+  const test::TemporaryFolder folder;
+  Job one({}, 1), two({}, 2);
+  RigOptions o = small();
+  o.format = PhotoFormat::png;
+  o.photo.reduce = 3;
+  make_capture(folder / "a", o, one);
+  make_capture(folder / "b", o, two);
+  std::size_t compared = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder / "a")) {
+    const auto name = fs::relative(entry.path(), folder / "a");
+    if (!entry.is_regular_file() || name == "capture.json") continue;  // that one holds the files' times
+    EXPECT_EQ(read_file(entry.path()), read_file(folder / "b" / name)) << name;
+    ++compared;
+  }
+  EXPECT_EQ(compared, 4u + 2 + 4 + 3);  // photos, enclosure, masks; two cameras.json and mesh.ply
+}
+
+TEST(RigCapture, PlainFilesListTheirMatrices) {
+  const test::TemporaryFolder folder;
+  Job job;
+  RigOptions o = small();
+  EXPECT_EQ(test::expect_error([&] { make_photographs(folder / "p", o, job); }).code(), ErrorCode::invalid_argument);
+  o.distortion = false;
+  o.path = Path::ring;
+  make_photographs(folder / "p", o, job);
+  make_capture(folder / "c", o, job);
+  const Capture capture = Capture::open(folder / "c");
+  std::istringstream lines(read_file(folder / "p" / "P.txt"));
+  for (std::size_t i = 0; i < 4; ++i) {
+    std::string name;
+    Eigen::Matrix<double, 3, 4> p;
+    ASSERT_TRUE(lines >> name);
+    for (int k = 0; k < 12; ++k) ASSERT_TRUE(lines >> p(k / 4, k % 4));
+    EXPECT_EQ(read_file(folder / "p" / name), read_file(capture.photo_path(capture.shots[i])));
+    const Eigen::Vector3d point(.05, -.08, .11);
+    const Eigen::Vector2d expected = *capture.view(i).project(point);
+    EXPECT_LT(((p * point.homogeneous()).hnormalized() - expected).norm(), 1e-9);
+  }
+  EXPECT_EQ(test::expect_error([&] { make_photographs(folder / "p", o, job); }).code(), ErrorCode::invalid_argument);
+}
+
+TEST(RigCapture, CancelledOnesAreNoCapture) {
+  const test::TemporaryFolder folder;
+  Job job;
+  job.cancel();
+  EXPECT_EQ(test::expect_error([&] { make_capture(folder / "x", small(), job); }).code(), ErrorCode::cancelled);
+  EXPECT_FALSE(fs::exists(folder / "x" / "capture.json"));
+}
+
+TEST(RigCapture, OptionsAreChecked) {
+  const test::TemporaryFolder folder;
+  Job job;
+  for (const auto& spoil : {+[](RigOptions& o) { o.photos = 0; }, +[](RigOptions& o) { o.width = 3; },
+                            +[](RigOptions& o) { o.size_m = NAN; }, +[](RigOptions& o) { o.fill = 2; },
+                            +[](RigOptions& o) { o.jpeg_quality = 0; }, +[](RigOptions& o) { o.object = "nothing"; }}) {
+    RigOptions o = small();
+    spoil(o);
+    EXPECT_EQ(test::expect_error([&] { make_capture(folder / "x", o, job); }).code(), ErrorCode::invalid_argument);
+  }
+}
+
+TEST(Trajectory, LooksAtItsTargetFromItsRadius) {
+  Hemisphere h;
+  h.target = {.1, -.2, .3};
+  h.radius = 2;
+  h.jitter = 0;
+  for (const auto& poses : {hemisphere_trajectory(48, h), ring_trajectory(7, h), random_trajectory(20, h)})
+    for (const Pose& pose : poses) {
+      EXPECT_NEAR((pose.center() - h.target).norm(), 2, 1e-9);
+      EXPECT_LT((pose * h.target - Eigen::Vector3d(0, 0, 2)).norm(), 1e-9);
+      const double phi = std::acos((pose.center() - h.target).z() / 2);
+      EXPECT_GE(phi, h.phi_first - 1e-9);
+      EXPECT_LE(phi, h.phi_last + 1e-9);
+    }
+  // Upright pictures: what is above the target is above it in the picture (random views are rolled).
+  for (const Pose& pose : hemisphere_trajectory(600, h))
+    EXPECT_LT((pose * (h.target + Eigen::Vector3d(0, 0, .1))).y(), 0);
+  EXPECT_EQ(hemisphere_trajectory(600, h).size(), 600u);
+  EXPECT_EQ(hemisphere_trajectory(601, h).size(), 601u);
+  EXPECT_EQ(hemisphere_trajectory(1, h).size(), 1u);
+  EXPECT_EQ(test::expect_error([&] { ring_trajectory(0, h); }).code(), ErrorCode::invalid_argument);
+}
+
+TEST(Trajectory, FramingFillsTheSmallerSide) {
+  const Camera camera = default_camera(900, false);
+  const double distance = framing_distance(camera, .25, .8);
+  // The ball's outline seen from there: half-angle asin(r / d).
+  EXPECT_NEAR(2 * camera.f * std::tan(std::asin(.25 / distance)), .8 * camera.height, 1e-6);
+}
+
+}  // namespace
+}  // namespace lumihull::rig

@@ -1,0 +1,138 @@
+#include <lumihull/rig/object.h>
+
+#include <cmath>
+#include <fstream>
+#include <map>
+
+#include "support.h"
+
+namespace lumihull::rig {
+namespace {
+
+/// 2 - 2 genus for a closed, oriented 2-manifold in one piece; fails the test where an edge has not exactly two sides.
+int euler_characteristic(const hull::Mesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
+  for (const auto& t : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) ++sides[{t[k], t[(k + 1) % 3]}];
+  for (const auto& [edge, count] : sides) {
+    if (count != 1 || !sides.contains({edge.second, edge.first})) {
+      ADD_FAILURE() << "edge " << edge.first << " " << edge.second
+                    << " is not shared by two triangles of one orientation";
+      break;
+    }
+  }
+  return int(mesh.vertices.size()) - int(sides.size() / 2) + int(mesh.triangles.size());
+}
+
+TEST(Shapes, AreClosedOrientedAndOfTheSizeAsked) {
+  struct Case {
+    Object object;
+    int genus;
+  };
+  const Case cases[] = {{make_vase(.6, 60), 1},
+                        {make_bust(.6, 60), 0},
+                        {make_statue(.6, 80), 3},
+                        {make_box(.6), 0},
+                        {make_sphere(.6, 3), 0}};
+  for (const auto& [object, genus] : cases) {
+    SCOPED_TRACE(object.name);
+    EXPECT_EQ(euler_characteristic(object.mesh), 2 - 2 * genus);
+    EXPECT_GT(hull::enclosed_volume(object.mesh), .001);
+    const auto [low, high] = bounding_box(object.mesh);
+    EXPECT_NEAR((high - low).maxCoeff(), .6, 1e-5);
+    EXPECT_NEAR(low.z(), 0, 1e-6);
+  }
+}
+
+TEST(Shapes, FormulasGiveNormalsThatPointOutwards) {
+  const Object vase = make_vase(.6, 60);
+  const auto by_area = hull::vertex_normals(vase.mesh);
+  ASSERT_EQ(vase.normals.size(), vase.mesh.vertices.size());
+  double sum = 0;
+  for (std::size_t i = 0; i < by_area.size(); ++i) sum += by_area[i].dot(vase.normals[i]);
+  EXPECT_GT(sum / double(by_area.size()), .98);
+}
+
+TEST(Shapes, SphereIsOne) {
+  const Object sphere = make_sphere(.5, 5);
+  EXPECT_EQ(sphere.mesh.triangles.size(), 20u << 10);
+  for (const auto& v : sphere.mesh.vertices) ASSERT_NEAR((v - Eigen::Vector3f(0, 0, .25f)).norm(), .25, 1e-6);
+  // Inscribed: smaller, by no more than a layer of the flattest triangle's sagitta (edge .018, e² / (8 r) times the
+  // area).
+  const double ball = 4. / 3 * M_PI * .25 * .25 * .25, volume = hull::enclosed_volume(sphere.mesh);
+  EXPECT_LT(volume, ball);
+  EXPECT_GT(volume, ball * (1 - 1e-3));
+}
+
+class MeshFile : public testing::Test {
+ protected:
+  std::filesystem::path write(const std::string& text) {
+    const auto file = folder_ / "object.obj";
+    std::ofstream(file, std::ios::binary) << text;
+    Image picture(4, 4, 3);
+    write_png(folder_ / "object.png", picture);
+    return file;
+  }
+  Object read(const std::string& text) { return read_object(write(text), folder_ / "object.png", 1, true); }
+
+  test::TemporaryFolder folder_;
+  const std::string vertices_ = "v 0 0 0\nv 2 0 0\nv 2 0 2\nv 0 1 2\n";
+};
+
+TEST_F(MeshFile, TextureCoordinatesRunBesideTheTriangles) {
+  const Object o = read(vertices_ + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2/7 3/3 -1/-1\nf 1/4 3/3 2/2\n");
+  ASSERT_EQ(o.mesh.triangles.size(), 3u);
+  ASSERT_EQ(o.uv.size(), 3u);
+  EXPECT_EQ(o.uv[1][0], Eigen::Vector2f(0, 0));
+  EXPECT_EQ(o.uv[1][1], Eigen::Vector2f(1, 1));
+  EXPECT_EQ(o.uv[1][2], Eigen::Vector2f(0, 1));
+  EXPECT_EQ(o.uv[2][0], Eigen::Vector2f(0, 1));
+  // y up becomes z up, standing at 0, one metre long.
+  const auto [low, high] = bounding_box(o.mesh);
+  EXPECT_NEAR(high.z(), .5, 1e-6);
+  EXPECT_EQ(low.z(), 0);
+}
+
+TEST_F(MeshFile, HostileOnesAreErrorsThatNameTheFile) {
+  const std::string uv = "vt 0 0\nvt 1 0\nvt 1 1\n";
+  for (const std::string& bad : {
+           vertices_ + uv + "f 1 2 3\n",         // no coordinates
+           vertices_ + uv + "f 1/1 2/2 3/4\n",   // beyond the list
+           vertices_ + uv + "f 1/1 2/2 3/-4\n",  // before it
+           vertices_ + uv + "f 1/0 2/2 3/3\n",   // counted from 1
+           vertices_ + uv + "f 1/1 2/2 3/99999999999999999999999\n",
+           vertices_ + uv + "f 1/1 2/2 3/x\n",
+           vertices_ + uv + "f 1//1 2//2 3//3\n",
+           vertices_ + uv + "f 1/1 2/2 3/\n",
+           vertices_ + "vt nan 0\nvt 0 0\nf 1/1 2/1 3/1\n",
+           vertices_ + "vt 1e30 0\nvt 0 0\nf 1/1 2/1 3/1\n",
+           vertices_ + "vt 0\nf 1/1 2/1 3/1\n",
+           vertices_ + uv + "f 1/1 2/2 9/3\n",                                   // a vertex that is not there
+           std::string("v 1 1 1\nv 1 1 1\nv 1 1 1\n") + uv + "f 1/1 2/2 3/3\n",  // no extent
+           vertices_ + uv,                                                       // no face
+           std::string(),
+       }) {
+    SCOPED_TRACE(bad);
+    const Error error = test::expect_error([&] { read(bad); });
+    EXPECT_EQ(error.code(), ErrorCode::bad_input);
+    EXPECT_NE(error.subject().find("object.obj"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(MeshFile, NamesAreCheckedFirst) {
+  EXPECT_EQ(test::expect_error([] { object_by_name("teapot", 1); }).code(), ErrorCode::invalid_argument);
+  EXPECT_EQ(test::expect_error([] { object_by_name("vase", -1); }).code(), ErrorCode::invalid_argument);
+  EXPECT_EQ(test::expect_error([&] { object_by_name((folder_ / "absent.obj").string(), 1); }).code(),
+            ErrorCode::not_found);
+}
+
+TEST(Shapes, ARealTexturedMeshIsRead) {
+  LUMIHULL_NEED_REAL_DATA(spot, "spot");
+  const Object object = object_by_name((spot / "spot.obj").string(), .5);
+  EXPECT_EQ(object.uv.size(), object.mesh.triangles.size());
+  EXPECT_EQ(object.texture.channels(), 3);
+  EXPECT_EQ(euler_characteristic(object.mesh), 2);
+}
+
+}  // namespace
+}  // namespace lumihull::rig
