@@ -2,6 +2,7 @@
 #include <lumihull/base/files.h>
 #include <lumihull/hull/carve_capture.h>
 #include <lumihull/hull/region.h>
+#include <lumihull/hull/simplify.h>
 
 #include <chrono>
 
@@ -71,6 +72,16 @@ HullReport carve_capture(const Capture& capture, const HullStageOptions& options
   report.statistics = result.statistics;
   report.photographs = kept;
   report.triangles_carved = result.mesh.triangles.size();
+  if (options.max_triangles > 0 && result.mesh.triangles.size() > options.max_triangles) {
+    start = Clock::now();
+    SimplifyResult simple = simplify(result.mesh, {options.max_triangles, 0}, job);
+    report.simplification_error = simple.moved.max;
+    if (!simple.reached)
+      report.warnings.push_back("the surface can't be simplified below " +
+                                std::to_string(simple.mesh.triangles.size()) + " triangles without tearing it");
+    result.mesh = std::move(simple.mesh);
+    report.simplify_seconds = seconds_since(start);
+  }
   report.vertices = result.mesh.vertices.size();
   report.triangles = result.mesh.triangles.size();
   report.volume = enclosed_volume(result.mesh);

@@ -17,6 +17,8 @@ namespace lumihull::hull {
 namespace {
 
 constexpr int kCells = 64;  // of the coarse carve, along each side
+// Views that are looked at: fewer views leave a hull that contains the whole one's, and is hardly larger.
+constexpr std::size_t kRegionViews = 40, kCoarseViews = 24;
 
 bool constrains(const Silhouette& s) { return !s.is_empty() && !s.is_full(); }
 
@@ -81,6 +83,23 @@ std::optional<Box> meet_rays(std::span<const View> views, std::span<const Silhou
   return Box{point - half, point + half};
 }
 
+/// At most `most` of n indices, evenly spread.
+std::vector<std::size_t> spread(std::size_t n, std::size_t most) {
+  std::vector<std::size_t> chosen(std::min(n, most));
+  for (std::size_t k = 0; k < chosen.size(); ++k) chosen[k] = k * n / chosen.size();
+  return chosen;
+}
+
+/// A rule for `chosen` of `all` views: as many bad ones among them as chance may bring.
+CarveRule scaled(CarveRule rule, std::size_t chosen, std::size_t all) {
+  if (chosen == all) return rule;
+  if (rule.tolerance > 1)
+    rule.tolerance = std::min(rule.tolerance, 2 + int(double(rule.tolerance) * double(chosen) / double(all)));
+  rule.tolerance = std::clamp(rule.tolerance, 1, int(std::max<std::size_t>(chosen, 1)));
+  rule.min_views = 1;
+  return rule;
+}
+
 /// Makes a box's sides at least a thousandth of its longest: flat objects have a volume, too.
 Box grown(Box box, double share) {
   const Eigen::Vector3d margin = (share * box.size()).cwiseMax(0.001 * box.size().maxCoeff());
@@ -89,8 +108,19 @@ Box grown(Box box, double share) {
 
 }  // namespace
 
-Box find_region(std::span<const View> views, std::span<const Silhouette> silhouettes, const CarveRule& rule,
-                std::span<const std::string> names, Job& job) {
+Box find_region(std::span<const View> all_views, std::span<const Silhouette> all_silhouettes, const CarveRule& all_rule,
+                std::span<const std::string> all_names, Job& job) {
+  { const HullFunction valid(all_views, all_silhouettes, all_rule); }
+  const std::vector<std::size_t> chosen = spread(all_views.size(), kRegionViews);
+  std::vector<View> views;
+  std::vector<Silhouette> silhouettes;
+  std::vector<std::string> names;
+  for (const std::size_t i : chosen) {
+    views.push_back(all_views[i]);
+    silhouettes.push_back(all_silhouettes[i]);
+    names.push_back(name_of(all_names, i));
+  }
+  const CarveRule rule = scaled(all_rule, chosen.size(), all_views.size());
   const HullFunction function(views, silhouettes, rule);
   const auto count = std::count_if(silhouettes.begin(), silhouettes.end(), constrains);
   if (count < 2)
@@ -144,12 +174,18 @@ Box find_region(std::span<const View> views, std::span<const Silhouette> silhoue
 SilhouetteOptions silhouette_options(const View& view, const Box& region, int resolution) {
   const double voxel = make_grid(region, resolution).voxel;
   const double depth = (view.cam_from_world * region.center()).z();
-  const double nearest = std::max(depth - 0.5 * region.size().norm(), 0.25 * depth);
+  double nearest = depth;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d p(corner & 1 ? region.max.x() : region.min.x(), corner & 2 ? region.max.y() : region.min.y(),
+                            corner & 4 ? region.max.z() : region.min.z());
+    nearest = std::min(nearest, (view.cam_from_world * p).z());
+  }
+  nearest = std::max(nearest, 0.25 * depth);
   SilhouetteOptions options;
   if (!(depth > 0)) return options;
   const double px = voxel * view.camera.f * std::max(1.0, view.camera.s);  // footprint at depth 1
   options.cell_px = std::clamp(std::floor(0.25 * px / depth), 1.0, 64.0);
-  options.band_px = std::clamp(2 * px / nearest, 2.0, 1e4);
+  options.band_px = std::clamp(1.75 * px / nearest, 2.0, 1e4);
   return options;
 }
 
@@ -166,12 +202,10 @@ std::vector<Silhouette> make_silhouettes(std::span<const View> views, const std:
   };
   std::optional<Box> region = region_in;
   if (!region && !views.empty()) {
-    constexpr std::size_t kSample = 24;
-    const std::size_t n = std::min(views.size(), kSample);
-    std::vector<std::optional<Silhouette>> coarse(n);
-    const auto nth = [&](std::size_t k) { return k * views.size() / n; };
-    parallel_for(job, n, [&](std::size_t k) {
-      const std::size_t i = nth(k);
+    const std::vector<std::size_t> chosen = spread(views.size(), kCoarseViews);
+    std::vector<std::optional<Silhouette>> coarse(chosen.size());
+    parallel_for(job, chosen.size(), [&](std::size_t k) {
+      const std::size_t i = chosen[k];
       coarse[k] = named(i, [&] {
         const Camera& camera = views[i].camera;
         const double cell = std::clamp(std::round(std::max(camera.width, camera.height) / 256.0), 1.0, 64.0);
@@ -181,18 +215,16 @@ std::vector<Silhouette> make_silhouettes(std::span<const View> views, const std:
     std::vector<View> some_views;
     std::vector<Silhouette> some;
     std::vector<std::string> some_names;
-    for (std::size_t k = 0; k < n; ++k) {
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
       if (!constrains(*coarse[k])) continue;
-      some_views.push_back(views[nth(k)]);
+      some_views.push_back(views[chosen[k]]);
       some.push_back(*coarse[k]);
-      some_names.push_back(name_of(names, nth(k)));
+      some_names.push_back(name_of(names, chosen[k]));
     }
-    CarveRule some_rule = rule;
-    if (rule.tolerance > 1)
-      some_rule.tolerance =
-          std::min({rule.tolerance, 2 + int(double(rule.tolerance) * double(n) / double(views.size())),
-                    std::max(int(some.size()), 1)});
-    some_rule.min_views = 1;
+    if (some.size() < 2)
+      throw Error(ErrorCode::degenerate, std::to_string(some.size()) + " of " + std::to_string(chosen.size()) +
+                                             " masks have object and background; a hull needs at least 2");
+    const CarveRule some_rule = scaled(rule, some.size(), views.size());
     region = find_region(some_views, some, some_rule, some_names, job);
   }
 

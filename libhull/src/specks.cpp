@@ -1,5 +1,6 @@
 #include <lumihull/hull/carve.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numeric>

@@ -16,14 +16,16 @@ namespace lumihull::hull {
 
 /// The box around the visual hull, found from cameras and silhouettes: the pyramids around the silhouettes are
 /// intersected, the result is carved coarsely and conservatively (thin parts are not lost), grown where the hull goes
-/// on, and tightened. No scale or position is assumed.
+/// on, and tightened. No scale or position is assumed. At most 40 views, evenly spread, are looked at: the whole hull
+/// lies within theirs.
 ///
 /// names: of the views, for messages; empty or one each.
 /// Errors: degenerate (the views have no bounded region in common; the hull vanishes), as HullFunction, cancelled.
 LUMIHULL_API Box find_region(std::span<const View> views, std::span<const Silhouette> silhouettes,
                              const CarveRule& rule, std::span<const std::string> names, Job& job);
 
-/// The field that a voxel's footprint needs: cells of a quarter of a voxel, distances exact to two voxels.
+/// The field that a voxel's footprint needs: cells of a quarter of a voxel, distances exact to 1.75 voxels of the
+/// region's nearest corner.
 LUMIHULL_API SilhouetteOptions silhouette_options(const View& view, const Box& region, int resolution);
 
 /// Silhouettes of many masks, streamed: `load(i)` returns the i-th mask and is called from several threads; few masks
