@@ -48,6 +48,9 @@ if(LUMIHULL_SANITIZE)
   target_compile_options(lumihull_flags INTERFACE -fsanitize=${LUMIHULL_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(lumihull_flags INTERFACE -fsanitize=${LUMIHULL_SANITIZE})
 endif()
+if(LUMIHULL_FUZZ)
+  target_compile_options(lumihull_flags INTERFACE -fsanitize=fuzzer-no-link)  # the libraries tell what they have run
+endif()
 
 # lumihull_library(NAME FOLDER SOURCES file…): the shared library liblumihull_NAME.so from FOLDER/src, headers in
 # FOLDER/include, exported as lumihull::NAME.

@@ -10,11 +10,11 @@
 namespace lumihull::internal {
 
 /// Fills everything but cameras and poses. `name` is used in errors.
-void parse_capture_json(std::string_view text, const std::string& name, Capture& capture);
-std::string print_capture_json(const Capture& capture);
+LUMIHULL_API void parse_capture_json(std::string_view text, const std::string& name, Capture& capture);
+LUMIHULL_API std::string print_capture_json(const Capture& capture);
 
 /// Fills cameras and the shots' poses; parse_capture_json must have run before.
-void parse_cameras_json(std::string_view text, const std::string& name, Capture& capture);
+LUMIHULL_API void parse_cameras_json(std::string_view text, const std::string& name, Capture& capture);
 std::string print_cameras_json(const Capture& capture);
 
 }  // namespace lumihull::internal
