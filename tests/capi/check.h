@@ -77,4 +77,32 @@ static inline lh_mesh *tetrahedron(lh_context *ctx) {
   return mesh;
 }
 
+/* Twelve views of a ball of radius 1 and their silhouettes: eight cameras around, four above. */
+enum { kBallViews = 12, kBallSize = 96 };
+
+typedef struct {
+  lh_camera cameras[kBallViews];
+  double poses[kBallViews * 12];
+  uint8_t pixels[kBallSize * kBallSize];
+  const uint8_t *masks[kBallViews];
+} Ball;
+
+static inline void make_ball(lh_context *ctx, Ball *ball) {
+  const double distance = 6, f = 200, outline = f / sqrt(distance * distance - 1);
+  const double origin[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+  int i, x, y;
+  for (y = 0; y < kBallSize; ++y)
+    for (x = 0; x < kBallSize; ++x) {
+      const double r = hypot(x + 0.5 - 0.5 * kBallSize, y + 0.5 - 0.5 * kBallSize);
+      ball->pixels[kBallSize * y + x] = (uint8_t)(255 * fmin(1, fmax(0, outline - r + 0.5)) + 0.5);
+    }
+  for (i = 0; i < kBallViews; ++i) {
+    const double turn = 6.283185307179586 * i / 8, height = i < 8 ? 0.3 : 1.1;
+    const double eye[3] = {distance * cos(turn) * cos(height), distance * sin(turn) * cos(height), distance * sin(height)};
+    ball->cameras[i] = small_camera(kBallSize, kBallSize, f);
+    ball->masks[i] = ball->pixels;
+    MUST(ctx, lh_pose_look_at(ctx, eye, origin, up, ball->poses + 12 * i));
+  }
+}
+
 #endif

@@ -1,6 +1,7 @@
 /* Wrong use: a status and one line that names the argument, outputs untouched, no crash. */
 #define _POSIX_C_SOURCE 200809L
 #include <pthread.h>
+#include <sys/stat.h>
 #include <time.h>
 
 #include "check.h"
@@ -108,7 +109,7 @@ static void sizes(lh_context *ctx) {
   EXPECT(ctx, LH_EINPUT, lh_mesh_from_arrays(ctx, nan_vertex, 2, beyond, 1, &bad));
   EXPECT(ctx, LH_EINVAL, lh_picture_ssim(ctx, bytes, bytes, NULL, 4, 4, numbers));
   EXPECT(ctx, LH_EINVAL, lh_context_set_threads(ctx, 100000));
-  EXPECT(ctx, LH_EINVAL, lh_color_key_train(ctx, bytes, 2, NULL, 0, NULL, (lh_color_key **)&bad));
+  EXPECT(ctx, LH_EINVAL, lh_color_key_train(ctx, bytes, 0, NULL, 0, NULL, (lh_color_key **)&bad));
   CHECK(!image && !bad && numbers[2] == 1);
   lh_mesh_destroy(mesh);
 }
@@ -196,8 +197,10 @@ static void files(lh_context *ctx, const char *scratch) {
   CHECK(lh_context_status(ctx) == LH_ENOTFOUND);
   EXPECT(ctx, LH_ENOTFOUND, lh_mesh_read(ctx, "absent.ply", &read));
   EXPECT(ctx, LH_ENOTFOUND, lh_capture_open(ctx, "absent", &capture));
-  EXPECT(ctx, LH_EIO, lh_mesh_write(ctx, mesh, "/proc/lumihull.ply"));
-  CHECK_SAYS(ctx, "/proc/lumihull.ply");
+  snprintf(file, sizeof file, "%s/folder.ply", scratch);
+  CHECK(mkdir(file, 0777) == 0);
+  EXPECT(ctx, LH_EIO, lh_mesh_write(ctx, mesh, file)); /* a folder is in the way */
+  CHECK_SAYS(ctx, "folder.ply");
   snprintf(file, sizeof file, "%s/mesh.xyz", scratch);
   EXPECT(ctx, LH_EINVAL, lh_mesh_write(ctx, mesh, file));
   snprintf(file, sizeof file, "%s/half.png", scratch);
@@ -308,16 +311,19 @@ static lh_status train(lh_context *ctx, lh_color_key **out) {
 }
 
 static void cancel(lh_context *ctx) {
+  static Ball ball;
   Watch watch = {NULL, 0, LH_OK};
+  lh_mesh *mesh = NULL;
   lh_color_key *key = NULL;
   pthread_t thread;
   uint8_t colors[3 * 8] = {0};
   watch.ctx = ctx;
 
   /* From the progress callback. */
+  make_ball(ctx, &ball);
   MUST(ctx, lh_context_set_progress(ctx, stop_at_once, &watch));
-  EXPECT(ctx, LH_ECANCELLED, train(ctx, &key));
-  CHECK(watch.calls >= 1 && watch.inner == LH_EINVAL && key == NULL);
+  EXPECT(ctx, LH_ECANCELLED, lh_hull_carve(ctx, kBallViews, ball.cameras, ball.poses, ball.masks, NULL, &mesh));
+  CHECK(watch.calls >= 1 && watch.inner == LH_EINVAL && mesh == NULL);
   CHECK(lh_context_cancelled(ctx) == 1);
   MUST(ctx, lh_context_set_progress(ctx, NULL, NULL));
 

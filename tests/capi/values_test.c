@@ -129,7 +129,7 @@ static void mesh_and_rays(lh_context *ctx, const char *scratch) {
   char file[1024];
   const float origins[9] = {0.5f, 0.5f, 5, 9, 9, 9, 0.5f, 0.5f, 0.5f};
   const float directions[9] = {0, 0, -1, 0, 0, 1, NAN, 0, 1};
-  const float far_end[3] = {0.5f, 0.5f, -5};
+  const float inside[3] = {0.5f, 0.5f, 0.5f};
   uint8_t hidden = 9;
 
   CHECK(lh_mesh_vertex_count(mesh) == 4 && lh_mesh_triangle_count(mesh) == 4);
@@ -152,47 +152,27 @@ static void mesh_and_rays(lh_context *ctx, const char *scratch) {
   CHECK(hit[1] == LH_NO_HIT && isinf(distance[1]) && barycentric[2] == 0);
   CHECK(hit[2] == LH_NO_HIT); /* a direction that is not finite hits nothing */
   MUST(ctx, lh_ray_scene_hit(ctx, scene, origins, directions, 3, hit, NULL, NULL));
-  MUST(ctx, lh_ray_scene_occluded(ctx, scene, origins, far_end, 1, 0, &hidden));
-  CHECK(hidden == 1);
-  MUST(ctx, lh_ray_scene_occluded(ctx, scene, origins, far_end, 1, 0.49f, &hidden));
-  CHECK(hidden == 0); /* only z from 0.1 to -0.1 is left: inside, then through the bottom's edge or not at all */
+  MUST(ctx, lh_ray_scene_occluded(ctx, scene, origins, inside, 1, 0, &hidden));
+  CHECK(hidden == 1); /* the surface is at z = 1, eight ninths of the way */
+  MUST(ctx, lh_ray_scene_occluded(ctx, scene, origins, inside, 1, 0.2f, &hidden));
+  CHECK(hidden == 0);
 
   lh_ray_scene_destroy(scene);
   lh_mesh_destroy(mesh);
   lh_mesh_destroy(read);
 }
 
-/* The hull of a ball's silhouettes: a disc for every camera on its axis, eight cameras around and four above. */
 static void carve(lh_context *ctx) {
-  enum { kViews = 12, kSize = 96 };
-  const double radius = 1, distance = 6;
-  lh_camera cameras[kViews];
-  double poses[kViews * 12], volume = 0;
-  static uint8_t pixels[kSize * kSize];
-  const uint8_t *masks[kViews];
+  static Ball ball;
+  double volume = 0;
   lh_carve_options options;
   lh_mesh *hull = NULL, *half = NULL;
-  const double plane[4] = {0, 0, 1, 0}, origin[3] = {0, 0, 0};
-  int i, x, y;
-  const double f = 200, outline = f * radius / sqrt(distance * distance - radius * radius);
-  for (y = 0; y < kSize; ++y)
-    for (x = 0; x < kSize; ++x) {
-      const double r = hypot(x + 0.5 - 0.5 * kSize, y + 0.5 - 0.5 * kSize);
-      const double share = fmin(1, fmax(0, outline - r + 0.5));
-      pixels[kSize * y + x] = (uint8_t)(255 * share + 0.5);
-    }
-  for (i = 0; i < kViews; ++i) {
-    const double turn = 6.283185307179586 * i / 8, height = i < 8 ? 0.3 : 1.1;
-    const double eye[3] = {distance * cos(turn) * cos(height), distance * sin(turn) * cos(height), distance * sin(height)};
-    const double up[3] = {0, 0, 1};
-    cameras[i] = small_camera(kSize, kSize, f);
-    masks[i] = pixels;
-    MUST(ctx, lh_pose_look_at(ctx, eye, origin, up, poses + 12 * i));
-  }
+  const double plane[4] = {0, 0, 1, 0};
+  make_ball(ctx, &ball);
   memset(&options, 0, sizeof options);
   options.struct_size = sizeof options;
   options.resolution = 64;
-  MUST(ctx, lh_hull_carve(ctx, kViews, cameras, poses, masks, &options, &hull));
+  MUST(ctx, lh_hull_carve(ctx, kBallViews, ball.cameras, ball.poses, ball.masks, &options, &hull));
   MUST(ctx, lh_mesh_volume(ctx, hull, &volume));
   /* The hull of a ball contains it; twelve cones leave some more. */
   CHECK(volume > 4.18 && volume < 4.9);
@@ -213,7 +193,7 @@ static void carve(lh_context *ctx) {
 
   options.cut_planes = plane;
   options.cut_plane_count = 1;
-  MUST(ctx, lh_hull_carve(ctx, kViews, cameras, poses, masks, &options, &half));
+  MUST(ctx, lh_hull_carve(ctx, kBallViews, ball.cameras, ball.poses, ball.masks, &options, &half));
   {
     double half_volume = 0;
     MUST(ctx, lh_mesh_volume(ctx, half, &half_volume));
@@ -224,11 +204,12 @@ static void carve(lh_context *ctx) {
 
   /* Nothing is left where one view sees nothing: it is named. */
   {
-    static uint8_t nothing[kSize * kSize];
+    static uint8_t nothing[kBallSize * kBallSize];
     lh_mesh *none = NULL;
-    masks[3] = nothing;
+    ball.masks[3] = nothing;
     options.cut_plane_count = 0;
-    EXPECT(ctx, LH_EDEGENERATE, lh_hull_carve(ctx, kViews, cameras, poses, masks, &options, &none));
+    options.min_views = kBallViews; /* so that every view has its say wherever something could be left */
+    EXPECT(ctx, LH_EDEGENERATE, lh_hull_carve(ctx, kBallViews, ball.cameras, ball.poses, ball.masks, &options, &none));
     CHECK_SAYS(ctx, "view 3");
     CHECK(none == NULL);
   }

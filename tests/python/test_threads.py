@@ -45,7 +45,10 @@ def test_other_threads_run_meanwhile() -> None:
     assert during > 5  # none, were the GIL held
 
 
-def test_progress_is_told_on_the_callers_thread() -> None:
+Ball = tuple[list[lumihull.View], list[np.ndarray]]
+
+
+def test_progress_is_told_on_the_callers_thread(ball: Ball) -> None:
     said: list[tuple[str, int, int]] = []
     threads = set()
 
@@ -53,18 +56,18 @@ def test_progress_is_told_on_the_callers_thread() -> None:
         said.append((progress.stage, progress.done, progress.total))
         threads.add(threading.get_ident())
 
-    long_call(progress=listen)
+    lumihull.carve(*ball, resolution=256, progress=listen)
     assert threads == {threading.get_ident()}
     assert all(stage and 0 <= done <= total for stage, done, total in said)
     assert said[-1][1] == said[-1][2]
 
 
-def test_what_the_callback_raises_stops_the_call() -> None:
+def test_what_the_callback_raises_stops_the_call(ball: Ball) -> None:
     def refuse(progress: lumihull.Progress) -> None:
         raise LookupError("enough")
 
     with pytest.raises(LookupError, match="enough"):
-        long_call(progress=refuse, threads=1)
+        lumihull.carve(*ball, resolution=1000, threads=1, progress=refuse)
 
 
 @pytest.mark.parametrize("with_progress", [False, True])

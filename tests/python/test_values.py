@@ -147,7 +147,8 @@ def test_carve_a_ball(ball: tuple[list[lumihull.View], list[np.ndarray]]) -> Non
     half = lumihull.carve(views, masks, resolution=64, cut_planes=[(0, 0, 1, 0)])
     assert half.vertices[:, 2].max() < 0.05
     with pytest.raises(lumihull.Error) as caught:
-        lumihull.carve(views, masks[:3] + [np.zeros_like(masks[0])] + masks[4:], resolution=64)
+        nothing = np.zeros_like(masks[0])  # with min_views every view has its say wherever something could be left
+        lumihull.carve(views, masks[:3] + [nothing] + masks[4:], resolution=64, min_views=12)
     assert caught.value.code == "degenerate" and "view 3" in str(caught.value)
 
 
