@@ -165,14 +165,13 @@ Answer ask_opencv(const Samples& samples, const std::vector<std::array<float, 3>
   const auto ask = [&](std::size_t first, std::size_t last) {
     const cv::Mat queries(int(last - first), 3, CV_32F, const_cast<float*>(pixels[first].data()));
     cv::Mat results, neighbours;
+    // The tree puts its samples' indices (32-bit integers) where the labels belong, and leaves the neighbours empty.
     knn->findNearest(queries, kNeighbours, results, neighbours);
-    neighbours.convertTo(neighbours, CV_32F);
     for (std::size_t i = first; i < last; ++i) {
-      float votes = 0;
-      for (int j = 0; j < kNeighbours; ++j) {
-        const float v = neighbours.at<float>(int(i - first), j);
-        votes += tree ? float(samples.foreground[std::size_t(v)]) : v;  // the tree returns indices, not labels
-      }
+      int votes = 0;
+      for (int j = 0; j < kNeighbours; ++j)
+        votes += tree ? int(samples.foreground[std::size_t(results.at<int>(int(i - first), j))])
+                      : int(neighbours.at<float>(int(i - first), j));
       a.object[i] = 2 * votes > kNeighbours;
     }
   };
