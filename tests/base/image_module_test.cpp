@@ -4,6 +4,7 @@
 #include <lumihull/base/image.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -74,6 +75,25 @@ TEST(ImageModule, WebPIsRead) {
   double sum = 0;
   for (std::size_t i = 0; i < image.bytes(); ++i) sum += std::abs(int(back.data()[i]) - int(image.data()[i]));
   EXPECT_LT(sum / double(image.bytes()), 4);
+}
+
+TEST(ImageModule, LinearOpenExrIsEncodedToSrgb) {
+  NEED_MODULE();
+  setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1);
+  const test::TemporaryFolder folder;
+  cv::Mat mat(2, 3, CV_32FC3, cv::Scalar(2.0, 0.5, 0.21404114));  // blue, green, red
+  bool written = false;
+  try {
+    written = cv::imwrite((folder / "a.exr").string(), mat);
+  } catch (const cv::Exception&) {
+  }
+  if (!written) GTEST_SKIP() << "this OpenCV writes no OpenEXR";
+  const Image image = read_image(folder / "a.exr");
+  ASSERT_EQ(image.type(), PixelType::f32);
+  ASSERT_EQ(image.channels(), 3);
+  EXPECT_NEAR(image.row<float>(1)[0], 0.5, 1e-4);
+  EXPECT_NEAR(image.row<float>(1)[1], 0.7353569, 1e-4);
+  EXPECT_NEAR(image.row<float>(1)[2], 1.3532560, 1e-4);  // brighter than white stays so
 }
 
 /// A minimal TIFF, little-endian, one strip: entries are (tag, type, count, value).
