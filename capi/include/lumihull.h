@@ -3,20 +3,21 @@
  *
  * Rules that hold for every function here:
  *
- * - A call that can fail returns lh_status: LH_OK (0), or a negative LH_E… . On failure its outputs are untouched, and the
- *   context holds a one-line message and the subject (a file, a photograph) that it is about. No call throws, and no
- *   argument of documented type crashes it, except a pointer to memory that is not the caller's.
- * - One context a thread at a time. Handles (lh_capture, lh_mesh, …) belong to no context. lh_image, lh_color_key, lh_mesh
- *   and lh_ray_scene never change once they are made: any number of threads may read one. The others: one thread at a time.
+ * - A call that can fail returns lh_status: LH_OK (0), or a negative LH_E… . On failure its outputs are untouched, and
+ *   the context holds a one-line message and the subject (a file, a photograph) that it is about. No call throws,
+ *   and no argument of documented type crashes it, except a pointer to memory that is not the caller's.
+ * - One context a thread at a time. Handles (lh_capture, lh_mesh, …) belong to no context. lh_image, lh_color_key,
+ *   lh_mesh and lh_ray_scene never change once they are made: any number of threads may read one. The others:
+ *   one thread at a time.
  * - Arrays and strings that the caller passes are borrowed for the call. Strings are UTF-8 and end with NUL.
- * - Results of unknown length are read in two calls: first with a NULL buffer, which stores the size in *needed, then with
- *   a buffer of at least that size. Texts count their closing NUL. A buffer that is too small is LH_EINVAL.
- * - Structures start with `struct_size`, to be set to sizeof the structure; they only ever grow at the end. A smaller size
- *   than today's is an older caller's and is accepted; a larger one is accepted where what is unknown is zero. In option
- *   structures zero means the default for every field, so that `lh_carve_options o = {0}; o.struct_size = sizeof o;` is
- *   the defaults; and a NULL pointer is the defaults, too.
- * - A rigid transform is 3 x 4, row-major, [R t]: cam_from_world maps world points to the camera's frame: x right, y down,
- *   z forward. R is to be a rotation to within 1e-6. Units are the capture's: metres, or unknown.
+ * - Results of unknown length are read in two calls: first with a NULL buffer, which stores the size in *needed, then
+ *   with a buffer of at least that size. Texts count their closing NUL. A buffer that is too small is LH_EINVAL.
+ * - Structures start with `struct_size`, to be set to sizeof the structure; they only ever grow at the end. A smaller
+ *   size than today's is an older caller's and is accepted; a larger one is accepted where what is unknown is zero. In
+ *   option structures zero means the default for every field, so that
+ *   `lh_carve_options o = {0}; o.struct_size = sizeof o;` is the defaults; and a NULL pointer is the defaults, too.
+ * - A rigid transform is 3 x 4, row-major, [R t]: cam_from_world maps world points to the camera's frame: x right, y
+ *   down, z forward. R is to be a rotation to within 1e-6. Units are the capture's: metres, or unknown.
  * - Pixels: the centre of the first one is (0.5, 0.5). Pictures are row-major, channels interleaved, sRGB.
  * - `int32_t` flags: 0 is no, anything else is yes.
  *
@@ -128,8 +129,8 @@ typedef struct lh_camera {
  *
  * @param points    n x 3
  * @param n         may be 0
- * @param pixels    n x 2, px; NaN where a point lies behind the camera (z <= 0) or beyond the lens model's domain. A pixel
- *                  may lie outside the picture
+ * @param pixels    n x 2, px; NaN where a point lies behind the camera (z <= 0) or beyond the lens model's domain. A
+ *                  pixel may lie outside the picture
  * @param jacobians NULL, or n x 2 x 3: d pixel / d point, NaN likewise
  * @return LH_EINVAL: camera out of range
  */
@@ -161,7 +162,7 @@ typedef struct lh_image lh_image;
 
 typedef struct lh_image_options {
   size_t struct_size;
-  int32_t apply_orientation; /**< yes: turn the picture upright by its EXIF orientation. Off for what cameras refer to */
+  int32_t apply_orientation; /**< yes: turn it upright by its EXIF orientation. Off for what cameras refer to */
   int32_t channels;          /**< 0: as stored; 1, 3 or 4: convert */
 } lh_image_options;
 
@@ -262,7 +263,7 @@ LH_API size_t lh_mesh_triangle_count(const lh_mesh *mesh);
 LH_API lh_status lh_mesh_vertices(lh_context *ctx, const lh_mesh *mesh, float *out, size_t n);
 /** Copies the triangles: out n x 3 indices. n: lh_mesh_triangle_count or more. */
 LH_API lh_status lh_mesh_triangles(lh_context *ctx, const lh_mesh *mesh, uint32_t *out, size_t n);
-/** Unit normal of each vertex, weighted by area; (0, 0, 0) where undefined: out n x 3, n: lh_mesh_vertex_count or more. */
+/** Unit normal of each vertex, weighted by area; (0, 0, 0) where undefined: out n x 3, n: vertices or more. */
 LH_API lh_status lh_mesh_normals(lh_context *ctx, const lh_mesh *mesh, float *out, size_t n);
 /** Volume that a closed mesh encloses, in cubic units; positive where its triangles are oriented outwards. */
 LH_API lh_status lh_mesh_volume(lh_context *ctx, const lh_mesh *mesh, double *out);
@@ -270,19 +271,19 @@ LH_API lh_status lh_mesh_volume(lh_context *ctx, const lh_mesh *mesh, double *ou
 /** What a mesh is, as a surface. */
 typedef struct lh_mesh_report {
   size_t struct_size;
-  int32_t closed;                 /**< every edge has two triangles */
-  int32_t manifold;               /**< closed, and the triangles around each vertex are one fan */
-  int32_t oriented;               /**< every edge is passed once in each direction */
+  int32_t closed;   /**< every edge has two triangles */
+  int32_t manifold; /**< closed, and the triangles around each vertex are one fan */
+  int32_t oriented; /**< every edge is passed once in each direction */
   int32_t self_intersections_known;
-  uint64_t self_intersections;    /**< pairs of triangles that pass through each other */
-  uint64_t degenerate_triangles;  /**< without area */
+  uint64_t self_intersections;   /**< pairs of triangles that pass through each other */
+  uint64_t degenerate_triangles; /**< without area */
   uint64_t unused_vertices;
-  uint64_t parts;                 /**< connected by shared vertices */
-  int64_t euler;                  /**< vertices - edges + triangles: 2 for each part that is like a sphere */
+  uint64_t parts; /**< connected by shared vertices */
+  int64_t euler;  /**< vertices - edges + triangles: 2 for each part that is like a sphere */
 } lh_mesh_report;
 
-/** Examines a mesh. self_intersections: no leaves that count out; it also stays unknown where the mesh is not manifold and
- *  where the library was built without CGAL. out: its struct_size says how much of it is filled. */
+/** Examines a mesh. self_intersections: no leaves that count out; it also stays unknown where the mesh is not manifold
+ * and where the library was built without CGAL. out: its struct_size says how much of it is filled. */
 LH_API lh_status lh_mesh_check(lh_context *ctx, const lh_mesh *mesh, int32_t self_intersections, lh_mesh_report *out);
 
 /**
@@ -300,16 +301,16 @@ LH_API lh_status lh_mesh_simplify(lh_context *ctx, const lh_mesh *mesh, size_t m
 
 typedef struct lh_carve_options {
   size_t struct_size;
-  int32_t resolution;         /**< cubic voxels along the longest side of the region, 8 … 2048; 0: 256 */
-  int32_t has_region;         /**< no: the region is found from cameras and masks */
-  double region[6];           /**< x, y, z of the least corner, then of the greatest */
-  int32_t tolerance;          /**< a point is carved only where so many views say so; 0: 1, the visual hull */
-  int32_t min_views;          /**< a point that fewer views see is no object; 0: 1 */
-  double min_component;       /**< parts below this share of the largest part's volume go; 0: 0.01; negative: all stay */
-  const double *cut_planes;   /**< n x 4, (normal, offset): what lies at normal · x > offset is cut away */
-  size_t cut_plane_count;     /**< n */
-  const double *cut_boxes;    /**< n x 6, like region: what lies within is cut away */
-  size_t cut_box_count;       /**< n */
+  int32_t resolution;       /**< cubic voxels along the longest side of the region, 8 … 2048; 0: 256 */
+  int32_t has_region;       /**< no: the region is found from cameras and masks */
+  double region[6];         /**< x, y, z of the least corner, then of the greatest */
+  int32_t tolerance;        /**< a point is carved only where so many views say so; 0: 1, the visual hull */
+  int32_t min_views;        /**< a point that fewer views see is no object; 0: 1 */
+  double min_component;     /**< parts below this share of the largest part's volume go; 0: 0.01; negative: all stay */
+  const double *cut_planes; /**< n x 4, (normal, offset): what lies at normal · x > offset is cut away */
+  size_t cut_plane_count;   /**< n */
+  const double *cut_boxes;  /**< n x 6, like region: what lies within is cut away */
+  size_t cut_box_count;     /**< n */
 } lh_carve_options;
 
 /**
@@ -385,16 +386,16 @@ LH_API lh_status lh_capture_add_camera(lh_context *ctx, lh_capture *capture, con
 LH_API lh_status lh_capture_get_camera(lh_context *ctx, const lh_capture *capture, size_t index, lh_camera *camera);
 LH_API lh_status lh_capture_set_camera(lh_context *ctx, lh_capture *capture, size_t index, const lh_camera *camera);
 
-/** Adds a photograph, not positioned; its index is the old lh_capture_shot_count. file: relative to the capture's folder,
- *  or absolute; it is not copied. @return LH_EINVAL: name in use or no plain file name, no such camera */
+/** Adds a photograph, not positioned; its index is the old lh_capture_shot_count. file: relative to the capture's
+ * folder, or absolute; it is not copied. @return LH_EINVAL: name in use or no plain file name, no such camera */
 LH_API lh_status lh_capture_add_shot(lh_context *ctx, lh_capture *capture, const char *name, const char *file,
                                      size_t camera);
 /** The shot's unique name. */
-LH_API lh_status lh_capture_shot_name(lh_context *ctx, const lh_capture *capture, size_t shot, char *buffer, size_t size,
-                                      size_t *needed);
+LH_API lh_status lh_capture_shot_name(lh_context *ctx, const lh_capture *capture, size_t shot, char *buffer,
+                                      size_t size, size_t *needed);
 /** The photograph's path. */
-LH_API lh_status lh_capture_shot_file(lh_context *ctx, const lh_capture *capture, size_t shot, char *buffer, size_t size,
-                                      size_t *needed);
+LH_API lh_status lh_capture_shot_file(lh_context *ctx, const lh_capture *capture, size_t shot, char *buffer,
+                                      size_t size, size_t *needed);
 /** The index of the shot's camera. */
 LH_API lh_status lh_capture_shot_camera(lh_context *ctx, const lh_capture *capture, size_t shot, size_t *camera);
 /** Whether the shot is held out of training, hull and appearance. */
@@ -404,9 +405,11 @@ LH_API lh_status lh_capture_set_hold_out(lh_context *ctx, lh_capture *capture, i
 /** What pictures are composited on when they are judged, 8-bit sRGB; keying sets it where it is not set. */
 LH_API lh_status lh_capture_set_background(lh_context *ctx, lh_capture *capture, const uint8_t rgb[3]);
 /** @return LH_ENOTFOUND: the shot is not positioned */
-LH_API lh_status lh_capture_get_pose(lh_context *ctx, const lh_capture *capture, size_t shot, double cam_from_world[12]);
+LH_API lh_status lh_capture_get_pose(lh_context *ctx, const lh_capture *capture, size_t shot,
+                                     double cam_from_world[12]);
 /** cam_from_world: NULL takes the pose away. */
-LH_API lh_status lh_capture_set_pose(lh_context *ctx, lh_capture *capture, size_t shot, const double cam_from_world[12]);
+LH_API lh_status lh_capture_set_pose(lh_context *ctx, lh_capture *capture, size_t shot,
+                                     const double cam_from_world[12]);
 /** The photograph, 3 channels. @return LH_EINPUT: its size is not its camera's */
 LH_API lh_status lh_capture_read_photo(lh_context *ctx, const lh_capture *capture, size_t shot, lh_image **out);
 /** The silhouette, 8 bits, 1 channel, 255 = object. @return LH_ENOTFOUND: there is none */
@@ -454,10 +457,12 @@ typedef void (*lh_stage_fn)(void *user, const lh_stage_result *result);
  */
 LH_API lh_status lh_capture_run_stage(lh_context *ctx, lh_capture *capture, const char *stage, int32_t force,
                                       lh_stage_fn fn, void *user);
-/** All the stages that exist and are needed, in order; fn is called for each that was done or skipped. */
+/** All the stages that exist and are needed, in order. When all have ended, fn is called for each, those that were left
+ * out or skipped included; where one fails it is not called, and the stages before it keep their results. */
 LH_API lh_status lh_capture_run(lh_context *ctx, lh_capture *capture, int32_t force, lh_stage_fn fn, void *user);
 
-/** evaluate/evaluation.json, which the stage "evaluate" leaves: means over the held-out photographs, and each one's values.
+/** evaluate/evaluation.json, which the stage "evaluate" leaves: means over the held-out photographs, and each one's
+ * values.
  *  @return LH_ENOTFOUND: the stage has not been run */
 LH_API lh_status lh_capture_evaluation(lh_context *ctx, const lh_capture *capture, char *buffer, size_t size,
                                        size_t *needed);
@@ -466,16 +471,18 @@ LH_API lh_status lh_capture_evaluation(lh_context *ctx, const lh_capture *captur
 
 typedef struct lh_import_options {
   size_t struct_size;
-  int32_t reference;         /**< yes: refer to photographs where they are instead of copying them */
-  double pixel_shift;        /**< projections: added to their pixels so that the first one's centre becomes 0.5: 0 where it is
-                                  already, 0.5 where the matrices say 0 (OpenCV), -0.5 where they say 1 (MATLAB) */
-  double max_refit_error_px; /**< NeRF, COLMAP: lenses of other models are refitted; the largest error allowed; 0: 0.5 */
+  int32_t reference;  /**< yes: refer to photographs where they are instead of copying them */
+  double pixel_shift; /**< projections: added to their pixels so that the first one's centre becomes 0.5: 0 where it is
+                           already, 0.5 where the matrices say 0 (OpenCV), -0.5 where they say 1 (MATLAB) */
+  double
+      max_refit_error_px; /**< NeRF, COLMAP: lenses of other models are refitted; the largest error allowed; 0: 0.5 */
 } lh_import_options;
 
 /*
- * Importers make a new capture in `folder`, which does not exist yet or is empty. A failed or cancelled import leaves no
- * half of one. What they had to decide (a mirrored world, refitted lenses) stands under "notes" in lh_capture_describe.
- * All: LH_EINVAL: the folder is in use; LH_ENOTFOUND, LH_EINPUT: names the file, line or JSON pointer; LH_ECANCELLED.
+ * Importers make a new capture in `folder`, which does not exist yet or is empty. A failed or cancelled import leaves
+ * no half of one. What they had to decide (a mirrored world, refitted lenses) stands under "notes" in
+ * lh_capture_describe. All: LH_EINVAL: the folder is in use; LH_ENOTFOUND, LH_EINPUT: names the file, line or JSON
+ * pointer; LH_ECANCELLED.
  */
 
 /** "NAME p11 p12 … p34" a line, any scale, sign and handedness; names relative to the listing.
@@ -513,11 +520,13 @@ LH_API lh_status lh_capture_export_nerf(lh_context *ctx, const lh_capture *captu
 
 /* ---- new views --------------------------------------------------------------------------------------------------- */
 
-/** Renders new views of a capture that has a hull. Photographs are read when first needed and kept for the next view. */
+/** Renders new views of a capture that has a hull. Photographs are read when first needed and kept for the next view.
+ */
 typedef struct lh_renderer lh_renderer;
 
-/** method: "lumigraph" blends photographs on the hull; "mean_texture" shows the model in textured.glb; "shaded" the bare
- *  hull in grey. What it needs of the capture is copied. @return LH_ENOTFOUND: the stage that makes it has not been run */
+/** method: "lumigraph" blends photographs on the hull; "mean_texture" shows the model in textured.glb; "shaded" the
+ * bare hull in grey. What it needs of the capture is copied. @return LH_ENOTFOUND: the stage that makes it has not been
+ * run */
 LH_API lh_status lh_renderer_create(lh_context *ctx, const lh_capture *capture, const char *method, lh_renderer **out);
 LH_API void lh_renderer_destroy(lh_renderer *renderer);
 
@@ -550,16 +559,16 @@ LH_API lh_status lh_renderer_turntable(lh_context *ctx, const lh_renderer *rende
 /* ---- how good is it ---------------------------------------------------------------------------------------------- */
 
 /*
- * a, b: height x width x 3, 8-bit sRGB; mask: NULL, or height x width: only pixels of 128 and more count (NaN where there
- * is none).
+ * a, b: height x width x 3, 8-bit sRGB; mask: NULL, or height x width: only pixels of 128 and more count (NaN where
+ * there is none).
  */
 
 /** Peak signal-to-noise ratio in dB: 10 log10(255² / mean squared error); 100 for equal pictures. */
-LH_API lh_status lh_picture_psnr(lh_context *ctx, const uint8_t *a, const uint8_t *b, const uint8_t *mask, int32_t width,
-                                 int32_t height, double *out);
+LH_API lh_status lh_picture_psnr(lh_context *ctx, const uint8_t *a, const uint8_t *b, const uint8_t *mask,
+                                 int32_t width, int32_t height, double *out);
 /** Structural similarity (Wang et al. 2004), 11 x 11, sigma 1.5; at least 11 x 11 pixels. */
-LH_API lh_status lh_picture_ssim(lh_context *ctx, const uint8_t *a, const uint8_t *b, const uint8_t *mask, int32_t width,
-                                 int32_t height, double *out);
+LH_API lh_status lh_picture_ssim(lh_context *ctx, const uint8_t *a, const uint8_t *b, const uint8_t *mask,
+                                 int32_t width, int32_t height, double *out);
 /** Intersection over union of the pixels of 128 and more of two masks, height x width; 1 where both are empty. */
 LH_API lh_status lh_mask_iou(lh_context *ctx, const uint8_t *a, const uint8_t *b, int32_t width, int32_t height,
                              double *out);

@@ -10,42 +10,42 @@
 
 static int check_failures = 0;
 
-#define CHECK(condition)                                                    \
-  do {                                                                      \
-    if (!(condition)) {                                                     \
+#define CHECK(condition)                                                        \
+  do {                                                                          \
+    if (!(condition)) {                                                         \
       fprintf(stderr, "%s:%d: not true: %s\n", __FILE__, __LINE__, #condition); \
-      ++check_failures;                                                     \
-    }                                                                       \
+      ++check_failures;                                                         \
+    }                                                                           \
   } while (0)
 
 /* The call must return that status; else its message is printed. */
-#define EXPECT(ctx, status, call)                                                                                   \
-  do {                                                                                                              \
-    const lh_status check_status = (call);                                                                          \
-    if (check_status != (status)) {                                                                                 \
-      fprintf(stderr, "%s:%d: %s: expected \"%s\", found \"%s\": %s: %s\n", __FILE__, __LINE__, #call,              \
+#define EXPECT(ctx, status, call)                                                                                      \
+  do {                                                                                                                 \
+    const lh_status check_status = (call);                                                                             \
+    if (check_status != (status)) {                                                                                    \
+      fprintf(stderr, "%s:%d: %s: expected \"%s\", found \"%s\": %s: %s\n", __FILE__, __LINE__, #call,                 \
               lh_status_text(status), lh_status_text(check_status), lh_context_subject(ctx), lh_context_message(ctx)); \
-      ++check_failures;                                                                                             \
-    }                                                                                                               \
+      ++check_failures;                                                                                                \
+    }                                                                                                                  \
   } while (0)
 
 /* The same for what everything after it depends on. */
-#define MUST(ctx, call)                     \
-  do {                                      \
-    const int check_before = check_failures; \
-    EXPECT(ctx, LH_OK, call);               \
+#define MUST(ctx, call)                          \
+  do {                                           \
+    const int check_before = check_failures;     \
+    EXPECT(ctx, LH_OK, call);                    \
     if (check_failures != check_before) exit(1); \
   } while (0)
 
 /* The last call's failure names `word` in its message or subject, in one line. */
-#define CHECK_SAYS(ctx, word)                                                                               \
-  do {                                                                                                      \
-    if (!strstr(lh_context_message(ctx), word) && !strstr(lh_context_subject(ctx), word)) {                 \
+#define CHECK_SAYS(ctx, word)                                                                                   \
+  do {                                                                                                          \
+    if (!strstr(lh_context_message(ctx), word) && !strstr(lh_context_subject(ctx), word)) {                     \
       fprintf(stderr, "%s:%d: expected \"%s\" in: %s: %s\n", __FILE__, __LINE__, word, lh_context_subject(ctx), \
-              lh_context_message(ctx));                                                                     \
-      ++check_failures;                                                                                     \
-    }                                                                                                       \
-    CHECK(!strchr(lh_context_message(ctx), '\n'));                                                          \
+              lh_context_message(ctx));                                                                         \
+      ++check_failures;                                                                                         \
+    }                                                                                                           \
+    CHECK(!strchr(lh_context_message(ctx), '\n'));                                                              \
   } while (0)
 
 static inline int check_result(void) {
@@ -98,7 +98,8 @@ static inline void make_ball(lh_context *ctx, Ball *ball) {
     }
   for (i = 0; i < kBallViews; ++i) {
     const double turn = 6.283185307179586 * i / 8, height = i < 8 ? 0.3 : 1.1;
-    const double eye[3] = {distance * cos(turn) * cos(height), distance * sin(turn) * cos(height), distance * sin(height)};
+    const double eye[3] = {distance * cos(turn) * cos(height), distance * sin(turn) * cos(height),
+                           distance * sin(height)};
     ball->cameras[i] = small_camera(kBallSize, kBallSize, f);
     ball->masks[i] = ball->pixels;
     MUST(ctx, lh_pose_look_at(ctx, eye, origin, up, ball->poses + 12 * i));

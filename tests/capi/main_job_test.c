@@ -1,5 +1,5 @@
-/* The whole main job through the C interface: photographs by the virtual rig in; silhouettes, hull, texture, new views and
- * their quality out. Arguments: the rig's folder (P.txt, photos, enclosure, truth), an empty folder to work in. */
+/* The whole main job through the C interface: photographs by the virtual rig in; silhouettes, hull, texture, new views
+ * and their quality out. Arguments: the rig's folder (P.txt, photos, enclosure, truth), an empty folder to work in. */
 #include "check.h"
 
 enum { kPath = 4096 };
@@ -70,7 +70,8 @@ static void compare_masks(lh_context *ctx, const lh_capture *capture) {
     snprintf(file, sizeof file, "truth/masks/%s.png", name);
     MUST(ctx, lh_capture_read_mask(ctx, capture, i, &mask));
     MUST(ctx, lh_image_read(ctx, in(rig, file), NULL, &truth));
-    MUST(ctx, lh_mask_iou(ctx, lh_image_data(mask), lh_image_data(truth), lh_image_width(mask), lh_image_height(mask), &iou));
+    MUST(ctx, lh_mask_iou(ctx, lh_image_data(mask), lh_image_data(truth), lh_image_width(mask), lh_image_height(mask),
+                          &iou));
     mean += iou / (double)n;
     lh_image_destroy(mask);
     lh_image_destroy(truth);

@@ -41,8 +41,8 @@ static void pose(lh_context *ctx) {
   const double eye[3] = {0, -5, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
   double m[12];
   MUST(ctx, lh_pose_look_at(ctx, eye, target, up, m));
-  CHECK(fabs(m[11] - 5) < 1e-12 && fabs(m[3]) < 1e-12);       /* the origin is 5 in front */
-  CHECK(fabs(m[6] + 1) < 1e-12);                              /* world z is the camera's -y */
+  CHECK(fabs(m[11] - 5) < 1e-12 && fabs(m[3]) < 1e-12); /* the origin is 5 in front */
+  CHECK(fabs(m[6] + 1) < 1e-12);                        /* world z is the camera's -y */
   EXPECT(ctx, LH_EINVAL, lh_pose_look_at(ctx, eye, target, eye, m));
   CHECK_SAYS(ctx, "up");
 }
@@ -55,7 +55,8 @@ static void image(lh_context *ctx, const char *scratch) {
   lh_image_options options;
   size_t i;
   for (i = 0; i < sizeof pixels; ++i) pixels[i] = (uint8_t)(7 * i);
-  MUST(ctx, lh_image_from_array(ctx, pixels, 4, 3, 3, LH_PIXEL_U8, 16, &made)); /* rows 16 bytes apart, 12 of them used */
+  MUST(ctx,
+       lh_image_from_array(ctx, pixels, 4, 3, 3, LH_PIXEL_U8, 16, &made)); /* rows 16 bytes apart, 12 of them used */
   CHECK(lh_image_width(made) == 4 && lh_image_height(made) == 3 && lh_image_channels(made) == 3);
   CHECK(lh_image_pixel_type(made) == LH_PIXEL_U8);
   data = lh_image_data(made);
@@ -104,7 +105,8 @@ static void color_key(lh_context *ctx, const char *scratch) {
   MUST(ctx, lh_color_key_decide(ctx, loaded, asked, 2, again));
   CHECK(memcmp(mask, again, 2) == 0);
 
-  for (i = 0; i < 64; ++i) memcpy(photo + 3 * i, asked + (i % 8 < 4 ? 0 : 3), 3); /* left half enclosure, right object */
+  for (i = 0; i < 64; ++i)
+    memcpy(photo + 3 * i, asked + (i % 8 < 4 ? 0 : 3), 3); /* left half enclosure, right object */
   MUST(ctx, lh_image_from_array(ctx, photo, 8, 8, 3, LH_PIXEL_U8, 0, &picture));
   MUST(ctx, lh_color_key_silhouette(ctx, key, picture, NULL, &silhouette));
   CHECK(lh_image_channels(silhouette) == 1 && lh_image_width(silhouette) == 8);
