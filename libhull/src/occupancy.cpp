@@ -45,6 +45,11 @@ class Splitter {
     }
     if (cell.seen + int(kept.size()) < function_.min_views) return;
     if (cell.size == 1) {
+      // Within the band the distance itself tells. From the middle to anywhere in the cell the field's slope (at most
+      // sqrt 2, interpolated) and the obliquity of rays up to 45 degrees off the axis change φ by less than twice the
+      // way.
+      for (const std::uint32_t i : kept)
+        if (function_.views[i].phi(center) > 2 * half.norm() && ++cell.deep_outside >= function_.rule.tolerance) return;
       seen_[(std::size_t(cell.z) * size_ + cell.y) * size_ + cell.x] = std::uint32_t(1 + cell.seen + whole);
       return;
     }

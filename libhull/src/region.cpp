@@ -130,6 +130,7 @@ Box find_region(std::span<const View> all_views, std::span<const Silhouette> all
   // With a tolerance single silhouettes prove nothing.
   std::optional<Box> start;
   if (rule.tolerance == 1) start = intersect_pyramids(views, silhouettes);
+  const bool contains_hull = start.has_value();
   if (!start) start = meet_rays(views, silhouettes);
   if (!start)
     throw Error(ErrorCode::degenerate,
@@ -143,8 +144,8 @@ Box find_region(std::span<const View> all_views, std::span<const Silhouette> all
     remove_specks(cells, 0.01);
     std::array<int, 3> first, last;
     if (!extent(cells, first, last)) {
-      // The start may have missed it.
-      if (++empty == 3) throw vanished(function, box, names, job);
+      // A start by rays may have missed it.
+      if (contains_hull || ++empty == 3) throw vanished(function, box, names, job);
       box = grown(box, 0.5);
       continue;
     }
