@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace lumihull::hull {
 namespace {
@@ -25,6 +26,44 @@ Mesh compacted(const Mesh& mesh, const std::vector<unsigned>& indices) {
   return out;
 }
 
+/// One pass of meshoptimizer; nullopt where the result is no longer a closed manifold.
+std::optional<Mesh> collapsed(const Mesh& mesh, std::size_t target, double max_error) {
+  std::vector<unsigned> indices;
+  indices.reserve(3 * mesh.triangles.size());
+  for (const auto& t : mesh.triangles) indices.insert(indices.end(), t.begin(), t.end());
+  const float* positions = mesh.vertices[0].data();
+  const float extent = meshopt_simplifyScale(positions, mesh.vertices.size(), sizeof(Eigen::Vector3f));
+  const float error = max_error > 0 ? float(max_error / extent) : 1.0f;
+  std::vector<unsigned> simplified(indices.size());
+  simplified.resize(meshopt_simplify(simplified.data(), indices.data(), indices.size(), positions, mesh.vertices.size(),
+                                     sizeof(Eigen::Vector3f), 3 * target, error, 0, nullptr));
+  if (simplified.size() < 12) return std::nullopt;
+  Mesh candidate = compacted(mesh, simplified);
+  if (!check_mesh(candidate, false).good()) return std::nullopt;
+  return candidate;
+}
+
+/// Collapses in a different order, by way of more triangles or towards fewer, find a way around a pinch.
+Mesh reduced_to(const Mesh& mesh, std::size_t most, double max_error, Job& job) {
+  Mesh best = mesh;
+  for (std::size_t round = 0; round < 16 && best.triangles.size() > most; ++round) {
+    job.check();
+    const std::size_t target = std::max<std::size_t>(most - round * most / 50, 4);
+    std::optional<Mesh> next = collapsed(best, target, max_error);
+    if (!next) next = collapsed(best, target + (best.triangles.size() - target) / (2 + round), max_error);
+    if (next && next->triangles.size() < best.triangles.size()) best = std::move(*next);
+  }
+  return best;
+}
+
+Mesh reduced_within(const Mesh& mesh, double max_error, Job& job) {
+  for (int round = 0; round < 8; ++round, max_error *= 0.8) {
+    job.check();
+    if (std::optional<Mesh> next = collapsed(mesh, 4, max_error)) return std::move(*next);
+  }
+  return mesh;
+}
+
 }  // namespace
 
 SimplifyResult simplify(const Mesh& mesh, const SimplifyOptions& options, Job& job) {
@@ -33,33 +72,9 @@ SimplifyResult simplify(const Mesh& mesh, const SimplifyOptions& options, Job& j
     throw Error(ErrorCode::invalid_argument, "simplification needs a number of triangles or a positive error");
   validate(mesh, "mesh");
   SimplifyResult result;
-  result.mesh = mesh;
   if (mesh.empty()) return result;
-  std::vector<unsigned> indices;
-  indices.reserve(3 * mesh.triangles.size());
-  for (const auto& t : mesh.triangles) indices.insert(indices.end(), t.begin(), t.end());
-  const float* positions = mesh.vertices[0].data();
-  const float extent = meshopt_simplifyScale(positions, mesh.vertices.size(), sizeof(Eigen::Vector3f));
-  const float error = options.max_error > 0 ? float(options.max_error / extent) : 1.0f;
-
-  std::size_t target = options.max_triangles > 0 ? options.max_triangles : 4;
-  while (target < mesh.triangles.size()) {
-    job.check();
-    std::vector<unsigned> simplified(indices.size());
-    float moved = 0;
-    simplified.resize(meshopt_simplify(simplified.data(), indices.data(), indices.size(), positions,
-                                       mesh.vertices.size(), sizeof(Eigen::Vector3f), 3 * target, error, 0, &moved));
-    if (simplified.size() >= 12) {
-      Mesh candidate = compacted(mesh, simplified);
-      if (check_mesh(candidate, false).good()) {
-        result.mesh = std::move(candidate);
-        break;
-      }
-    }
-    // Where it can't get below a number, the next larger one to try is beyond that.
-    target = std::max(target, simplified.size() / 3);
-    target += target / 4 + 16;
-  }
+  result.mesh = options.max_triangles > 0 ? reduced_to(mesh, options.max_triangles, options.max_error, job)
+                                          : reduced_within(mesh, options.max_error, job);
   result.reached = options.max_triangles == 0 || result.mesh.triangles.size() <= options.max_triangles;
   if (result.mesh.triangles.size() < mesh.triangles.size()) {
     const MeshDistance there = distance(mesh, result.mesh, job), back = distance(result.mesh, mesh, job);

@@ -28,9 +28,9 @@ struct SimplifyResult {
 };
 
 /// Fewer triangles for a closed manifold mesh, which stays closed, manifold and oriented: quadric edge collapses by
-/// meshoptimizer, each result checked; where a collapse pinched the surface, a larger number of triangles is tried, and
-/// in the end the mesh is returned as it was.
-/// Errors: invalid_argument (neither bound is set, an error that is negative or not finite), bad_input, cancelled.
+/// meshoptimizer, each result checked; where a collapse pinched the surface, other orders of collapses are tried, and
+/// what was reached without is returned (at worst the mesh as it was). Errors: invalid_argument (neither bound is set,
+/// an error that is negative or not finite), bad_input, cancelled.
 LUMIHULL_API SimplifyResult simplify(const Mesh& mesh, const SimplifyOptions& options, Job& job);
 
 }  // namespace lumihull::hull
