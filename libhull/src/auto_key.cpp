@@ -12,6 +12,7 @@ namespace lumihull::hull {
 namespace {
 
 constexpr double kSpeck = 2e-4, kHole = 1e-4;  // of the picture; what `clean` takes away and fills
+constexpr double kShadowHole = 3e-3;           // as kHole, for shadows before a dark enclosure
 
 [[noreturn]] void fail(const std::string& message) { throw Error(ErrorCode::invalid_argument, message, "key options"); }
 
@@ -88,6 +89,25 @@ void confine(Image& mask, const Image& photo, const Capture& capture, std::size_
   }
 }
 
+/// Fills holes of the size that shadows have, where all but a few views agree that the object is there.
+void fill_shadows(Image& mask, const Capture& capture, std::size_t shot, const LearnedKey& learned) {
+  if (!learned.solid || !capture.positioned(shot)) return;
+  CoarseView view;
+  view.step = thinning_step(mask.width(), mask.height());
+  view.view = capture.view(shot);
+  view.mask = Image(std::max(1, mask.width() / view.step), std::max(1, mask.height() / view.step), 1);
+  const Image solid = shrunk(learned.solid->silhouette(view, 0), learned.solid->margin_px(view) / 2);
+  Image filled = mask;
+  calib::clean_mask(filled, 0, int(kShadowHole * double(mask.width()) * mask.height()));
+  for (int y = 0; y < mask.height(); ++y) {
+    const std::uint8_t* in = filled.row<std::uint8_t>(y);
+    const std::uint8_t* is_solid = solid.row<std::uint8_t>(std::min(y / view.step, solid.height() - 1));
+    std::uint8_t* row = mask.row<std::uint8_t>(y);
+    for (int x = 0; x < mask.width(); ++x)
+      if (in[x] && is_solid[std::min(x / view.step, solid.width() - 1)]) row[x] = 255;
+  }
+}
+
 }  // namespace
 
 void KeyOptions::validate() const {
@@ -150,6 +170,7 @@ KeyReport key_capture(Capture& capture, const KeyOptions& options, Job& job) {
         } else {
           mask = calib::key_image(*key, photo, {calib::EdgeMode::hard, 0, 0});
           confine(mask, photo, capture, shot, *learned);
+          if (options.clean) fill_shadows(mask, capture, shot, *learned);
           calib::clean_mask(mask, speck, hole);
           calib::soften_edges(mask, photo, options.edges);
         }

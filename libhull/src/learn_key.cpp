@@ -15,6 +15,8 @@ constexpr std::size_t kMostPhotos = 64;  // evenly spread; they stay in memory, 
 constexpr double kMostPixels = 500'000;  // of a thinned photograph
 constexpr int kResolution = 96;          // voxels a side
 constexpr double kTolerance = 0.12;      // share of the views that may call an object's voxel background
+constexpr int kDark = 40;                // brightest channel of a background that shadows can't be told from
+constexpr double kDarkTolerance = 0.25;  // as kTolerance, before such a background
 constexpr double kShadowShare = 0.2;     // shadows among the background samples
 constexpr double kObjectShare = 0.5;     // samples of the object's own colours, as a share of the background's
 constexpr int kMostRounds = 5;
@@ -123,7 +125,7 @@ LearnedKey learn_key(const Capture& capture, std::span<const std::size_t> shots,
 
   std::vector<calib::ColorCount> background = calib::background_of_photos(
       used, [&](std::size_t i) { return photos[i]; }, job);
-  LearnedKey learned{train(background, options, job), {}, 0};
+  LearnedKey learned{train(background, options, job), {}, 0, {}};
 
   std::vector<Image> near(used);  // where the object can be, once there is a hull
   const auto key_views = [&] {
@@ -136,11 +138,14 @@ LearnedKey learn_key(const Capture& capture, std::span<const std::size_t> shots,
   key_views();
   if (std::count(positioned.begin(), positioned.end(), 1) < 3) return learned;
 
-  for (int round = 1; round <= kMostRounds; ++round) {
-    std::vector<CoarseView> carving;
+  const auto positioned_views = [&] {
+    std::vector<CoarseView> list;
     for (std::size_t i = 0; i < used; ++i)
-      if (positioned[i]) carving.push_back(views[i]);
-    std::optional<CoarseHull> hull = CoarseHull::carve(carving, kResolution, kTolerance, job);
+      if (positioned[i]) list.push_back(views[i]);
+    return list;
+  };
+  for (int round = 1; round <= kMostRounds; ++round) {
+    std::optional<CoarseHull> hull = CoarseHull::carve(positioned_views(), kResolution, kTolerance, job);
     if (!hull) break;
     learned.hull = std::move(hull);
     learned.rounds = round;
@@ -177,6 +182,9 @@ LearnedKey learn_key(const Capture& capture, std::span<const std::size_t> shots,
         }
     if (double(changed) <= kSettled * double(object)) break;
   }
+  const calib::Rgb median = learned.key.background_median();
+  if (learned.hull && *std::max_element(median.begin(), median.end()) < kDark)
+    learned.solid = CoarseHull::carve(positioned_views(), kResolution, kDarkTolerance, job);
   return learned;
 }
 

@@ -17,6 +17,8 @@ struct LearnedKey {
   calib::ColorKey key;
   std::optional<CoarseHull> hull;  ///< where cameras are known and agree on one
   int rounds = 0;                  ///< of carving and training again
+  /// Before a dark enclosure, where shadows on the object look like it: a hull so forgiving that they do not carve it.
+  std::optional<CoarseHull> solid;
 };
 
 /// Every step-th pixel of a photograph, so that at most 0.5 million are left: noise stays what it is.

@@ -30,7 +30,8 @@ struct LUMIHULL_API KeyOptions {
   std::uint64_t seed = 1;             ///< of the uniform foreground samples
   /// matte: contours at half coverage. hard and soft keep the key's decision at every pixel.
   calib::EdgeMode edges = calib::EdgeMode::matte;
-  /// Takes away specks of less than 0.02 % of the picture and fills holes of up to 0.01 %. With clean = false, edges
+  /// Takes away specks of less than 0.02 % of the picture and fills holes of up to 0.01 % (learned
+  /// from photographs before a dark enclosure: 0.3 %, where the hull agrees). With clean = false, edges
   /// hard or soft, and background = "enclosure" the masks are the paper's, pixel by pixel.
   bool clean = true;
 
