@@ -51,7 +51,7 @@ struct Lumigraph::Impl {
         scene(s),
         options(o),
         normals(hull::vertex_normals(m)),
-        cache(std::move(photos), {float(o.erosion_px), float(o.feather_px)}, o.cache_bytes),
+        cache(std::move(photos), {float(o.erosion_px), float(o.feather_px), float(o.edge_alpha)}, o.cache_bytes),
         ranking(s, float(o.visibility_offset) * box_diagonal(m), cache.photos(), o) {}
 
   Eigen::Vector3f normal_at(const hull::Hit& hit) const {
@@ -111,6 +111,7 @@ Lumigraph::Lumigraph(const hull::Mesh& mesh, const hull::RayScene& scene, PhotoS
   require(options.min_cosine >= 0 && options.min_cosine < 1, "min_cosine: expected 0 to less than 1");
   require(options.erosion_px >= 0 && options.erosion_px <= 64, "erosion_px: expected 0 to 64");
   require(options.feather_px >= 0 && options.feather_px <= 16, "feather_px: expected 0 to 16");
+  require(options.edge_alpha >= 0 && options.edge_alpha <= 1, "edge_alpha: expected 0 to 1");
   require(options.border_px >= 0 && options.border_px <= 1e4, "border_px: expected 0 to 10000");
   validate(photos);
   if (photos.size() == 0) throw Error(ErrorCode::degenerate, "there is no photograph to blend");

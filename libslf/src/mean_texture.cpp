@@ -33,6 +33,7 @@ void check(const TextureOptions& o) {
   require(o.visibility_offset >= 0 && o.visibility_offset <= 1, "visibility_offset: expected 0 to 1");
   require(o.erosion_px >= 0 && o.erosion_px <= 64, "erosion_px: expected 0 to 64");
   require(o.feather_px >= 0 && o.feather_px <= 16, "feather_px: expected 0 to 16");
+  require(o.edge_alpha >= 0 && o.edge_alpha <= 1, "edge_alpha: expected 0 to 1");
 }
 
 /// World size of a pixel of the photograph that resolves a triangle best, median over the surface.
@@ -234,7 +235,7 @@ TexturedMesh mean_texture(const hull::Mesh& mesh, const PhotoSet& photos, const 
   const Atlas atlas = make_atlas(mesh, options.texel_px * finest_pixel(mesh, photos), options.max_side);
 
   // One photograph's pixels at a time; the next few are read while nothing else needs the threads.
-  const EdgeOptions edge{float(options.erosion_px), float(options.feather_px)};
+  const EdgeOptions edge{float(options.erosion_px), float(options.feather_px), float(options.edge_alpha)};
   Accumulator accumulator(mesh, scene, atlas, options);
   job.begin("texture", photos.size());
   const std::size_t at_once = std::max(1u, std::min(job.threads(), 8u));

@@ -11,6 +11,7 @@
 namespace lumihull::slf {
 namespace {
 
+constexpr int kUnmixed = 250;            // alpha from which a pixel shows the object alone
 constexpr int kStep = 3, kDiagonal = 4;  // chamfer distance (Borgefors 1986): thirds of a pixel
 
 /// Distance to the nearest pixel whose alpha is below one half, in thirds of a pixel, at most 255. The picture's border
@@ -123,7 +124,7 @@ PreparedPhoto::PreparedPhoto(const Photo& photo, const EdgeOptions& edge, const 
       const float ramp =
           distance[i] == 255 ? 1.0f : std::clamp((d - edge.erosion_px) / std::max(edge.feather_px, 1e-3f), 0.0f, 1.0f);
       weight[i] = std::uint8_t(std::max(1.0f, std::round(ramp * float(a[x]))));
-      solid[i] = weight[i] >= 32;
+      solid[i] = float(a[x]) >= 255 * edge.edge_alpha && weight[i] >= 32;
     }
   }
   const std::vector<Offset> nearest = nearest_solid(solid, width_, height_);

@@ -11,13 +11,14 @@ namespace lumihull::slf {
 /// How the pixels next to a silhouette's edge count. They mix object and background, and the model's edge is never
 /// quite the photograph's.
 struct EdgeOptions {
-  float erosion_px = 0;  ///< pixels nearer to the background than this have next to no weight
-  float feather_px = 1;  ///< from there the weight rises to its full value over this width
+  float erosion_px = 0;     ///< pixels nearer to the background than this have next to no weight
+  float feather_px = 1;     ///< from there the weight rises to its full value over this width
+  float edge_alpha = 0.5f;  ///< pixels of a softer mask take the colour of the nearest one beyond it
 };
 
-/// A photograph ready for blending: sRGB with a weight of 1 … 255 in the fourth byte. Outside the object and in the
-/// eroded rim the colour is that of the nearest pixel inside and the weight is 1: such a place counts only where no
-/// other photograph knows better, and never shows the background.
+/// A photograph ready for blending: sRGB with a weight of 1 … 255 in the fourth byte. The eroded rim, pixels softer than
+/// edge_alpha and all outside take the colour of the nearest pixel that is none of these; outside, the weight is 1: such
+/// a place counts only where no other photograph knows better.
 class PreparedPhoto {
  public:
   /// Throws Error{bad_input} naming the photograph where picture, mask and camera differ in size or type.

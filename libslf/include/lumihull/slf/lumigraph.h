@@ -21,7 +21,10 @@ struct LumigraphOptions {
   double min_cosine = 0.1;  ///< photographs that see the surface flatter than this fade out, 0 … 1
   double erosion_px = 0;    ///< rim of the photographs' silhouettes that counts next to nothing, px
   double feather_px = 1;    ///< width over which the weight rises to full inside of it, px
-  double border_px = 8;     ///< width over which a photograph fades out at its picture's border, px
+  /// Pixels of a softer mask than this take the colour of the nearest one beyond it, 0 … 1. Low: rims as they were
+  /// photographed, mixed with the background (closer to held-out photographs); 0.98: no trace of the background.
+  double edge_alpha = 0.5;
+  double border_px = 8;  ///< width over which a photograph fades out at its picture's border, px
   std::size_t cache_bytes = std::size_t(2) << 30;  ///< memory for decoded photographs (4 bytes a pixel each)
 };
 

@@ -35,6 +35,8 @@ struct TextureOptions {
       0.003;              ///< how far beside the surface a shadow starts to count, in diagonals of the mesh's box
   double erosion_px = 0;  ///< rim of the photographs' silhouettes that counts next to nothing, px
   double feather_px = 1;  ///< width over which the weight rises to full inside of it, px
+  /// Pixels of a softer mask than this take the colour of the nearest one beyond it, 0 … 1; see LumigraphOptions.
+  double edge_alpha = 0.5;
 };
 
 /// What mean_texture found out on its way.
