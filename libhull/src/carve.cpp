@@ -2,6 +2,7 @@
 #include <lumihull/hull/carve.h>
 #include <lumihull/hull/region.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -9,6 +10,23 @@
 #include "hull_function.h"
 
 namespace lumihull::hull {
+
+namespace {
+
+/// Whether the views other than i keep a point. (View i's own word on its centre is rounding.)
+bool inside_for_the_others(const HullFunction& function, std::size_t i, const Eigen::Vector3d& point) {
+  int seen = 0, carvers = 0;
+  for (std::size_t k = 0; k < function.views(); ++k) {
+    const std::optional<double> phi = k == i ? std::nullopt : function.of_view(k, point);
+    if (!phi) continue;
+    ++seen;
+    carvers += *phi >= 0;
+  }
+  const CarveRule& rule = function.impl().rule;
+  return seen >= std::max(rule.min_views, rule.tolerance) && carvers < rule.tolerance;
+}
+
+}  // namespace
 
 CarveResult carve(std::span<const View> views, std::span<const Silhouette> silhouettes, const CarveOptions& options,
                   Job& job) {
@@ -56,13 +74,18 @@ CarveResult carve(std::span<const View> views, std::span<const Silhouette> silho
       statistics.least_band_voxels =
           std::min(statistics.least_band_voxels, silhouettes[i].band() * depth / result.grid.voxel);
   }
-  if (statistics.samples_inside == 0) throw vanished(function, region, options.names, job);
+  if (statistics.samples_inside == 0) {
+    if (const auto error = contradicted(function, views, silhouettes, options, job)) throw *error;
+    throw vanished(function, region, options.names, job);
+  }
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const Eigen::Vector3d center = views[i].center();
-    if (result.grid.region.contains(center) && function(center) < 0)
-      throw Error(ErrorCode::degenerate,
-                  "the camera is inside the object that the other views see: check its pose and their masks",
-                  name_of(options.names, i));
+    if (!result.grid.region.contains(views[i].center()) || !inside_for_the_others(function, i, views[i].center()))
+      continue;
+    // A mask of something else may leave only a scrap around some camera: then it is not the camera that is wrong.
+    if (const auto error = contradicted(function, views, silhouettes, options, job)) throw *error;
+    throw Error(ErrorCode::degenerate,
+                "the camera is inside the object that the other views see: check its pose and their masks",
+                name_of(options.names, i));
   }
 
   start = Clock::now();

@@ -1,6 +1,7 @@
 #include "explain.h"
 
 #include <lumihull/base/parallel.h>
+#include <lumihull/hull/region.h>
 
 #include <algorithm>
 #include <cmath>
@@ -63,13 +64,9 @@ Explanation explain(const HullFunction& function, const Box& region, Job& job) {
   return result;
 }
 
-Error vanished(const HullFunction& function, const Box& region, std::span<const std::string> names, Job& job) {
-  const Explanation why = explain(function, region, job);
-  if (why.best_seen == 0) return Error(ErrorCode::degenerate, "the hull vanishes: no view sees the region of space");
-  if (why.fewest_carvers < std::size_t(function.impl().rule.tolerance))
-    return Error(
-        ErrorCode::degenerate,
-        "the hull vanishes: it is thinner than a voxel, or cut away; raise the resolution or shrink the region");
+namespace {
+
+Error carved_away(const Explanation& why, std::size_t views, std::span<const std::string> names) {
   std::string list;
   std::size_t named = 0;
   for (; named < why.suspects.size() && named < std::max<std::size_t>(why.fewest_carvers, 1) && named < 8; ++named)
@@ -77,9 +74,41 @@ Error vanished(const HullFunction& function, const Box& region, std::span<const 
   if (named < why.fewest_carvers) list += " and others";
   return Error(ErrorCode::degenerate,
                "the hull vanishes: every point is carved away by at least " + std::to_string(why.fewest_carvers) +
-                   " of " + std::to_string(function.views()) + " views; where it is fewest, by " + list +
+                   " of " + std::to_string(views) + " views; where it is fewest, by " + list +
                    ": check their masks and poses",
                name_of(names, why.suspects.empty() ? 0 : why.suspects[0].view));
+}
+
+}  // namespace
+
+std::optional<Error> contradicted(const HullFunction& function, std::span<const View> views,
+                                  std::span<const Silhouette> silhouettes, const CarveOptions& options, Job& job) {
+  for (int tolerance = options.rule.tolerance + 1; std::size_t(4 * tolerance) <= views.size() + 4; tolerance *= 2) {
+    CarveRule rule = options.rule;
+    rule.tolerance = tolerance;
+    Box region;
+    try {
+      region = options.region ? *options.region : find_region(views, silhouettes, rule, options.names, job);
+    } catch (const Error& e) {
+      if (e.code() != ErrorCode::degenerate) throw;
+      continue;
+    }
+    const Explanation why = explain(function, region, job);
+    if (2 * why.best_seen >= views.size() && why.fewest_carvers >= std::size_t(options.rule.tolerance) &&
+        why.fewest_carvers < std::size_t(tolerance))
+      return carved_away(why, views.size(), options.names);
+  }
+  return std::nullopt;
+}
+
+Error vanished(const HullFunction& function, const Box& region, std::span<const std::string> names, Job& job) {
+  const Explanation why = explain(function, region, job);
+  if (why.best_seen == 0) return Error(ErrorCode::degenerate, "the hull vanishes: no view sees the region of space");
+  if (why.fewest_carvers < std::size_t(function.impl().rule.tolerance))
+    return Error(
+        ErrorCode::degenerate,
+        "the hull vanishes: it is thinner than a voxel, or cut away; raise the resolution or shrink the region");
+  return carved_away(why, function.views(), names);
 }
 
 }  // namespace lumihull::hull

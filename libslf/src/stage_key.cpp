@@ -86,7 +86,7 @@ const StageDefinition& key_stage() {
           {"seed", "seed of the foreground samples", std::int64_t(kDefaults.seed), 0},
           {"edges",
            "edge pixels: hard, soft (threshold 128 is the pure decision), matte (contour at half coverage)",
-           std::string("soft"),
+           std::string("matte"),
            0,
            0,
            {"hard", "soft", "matte"}},
