@@ -38,6 +38,10 @@ target_compile_options(lumihull_flags INTERFACE
   $<$<COMPILE_LANGUAGE:C>:-Wall -Wextra -pedantic>
   # One answer on every machine: no contraction of a * b + c behind our back.
   -ffp-contract=off)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  # False alarms for std::string's operator+ (GCC bug 105329).
+  target_compile_options(lumihull_flags INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wno-restrict>)
+endif()
 if(LUMIHULL_WERROR)
   target_compile_options(lumihull_flags INTERFACE -Werror)
 endif()

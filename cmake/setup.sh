@@ -37,7 +37,7 @@ build() {
   shift
   say "Building ($preset): $*"
   if [ ! -f "$root/build/$preset/build.ninja" ]; then
-    (cd "$root" && cmake --preset "$preset" -DLUMIHULL_WERROR=ON >"build/$preset.configure.log" 2>&1) ||
+    (cd "$root" && cmake --preset "$preset" >"build/$preset.configure.log" 2>&1) ||
       { tail -n 30 "$root/build/$preset.configure.log"; exit 1; }
   fi
   (cd "$root" && cmake --build "build/$preset" --target "$@")

@@ -457,8 +457,8 @@ typedef void (*lh_stage_fn)(void *user, const lh_stage_result *result);
  */
 LH_API lh_status lh_capture_run_stage(lh_context *ctx, lh_capture *capture, const char *stage, int32_t force,
                                       lh_stage_fn fn, void *user);
-/** All the stages that exist and are needed, in order. When all have ended, fn is called for each, those that were left
- * out or skipped included; where one fails it is not called, and the stages before it keep their results. */
+/** All the stages that exist and are needed, in order. fn is called when each has ended, those that were left out or
+ * skipped included; where one fails, the stages before it keep their results. */
 LH_API lh_status lh_capture_run(lh_context *ctx, lh_capture *capture, int32_t force, lh_stage_fn fn, void *user);
 
 /** evaluate/evaluation.json, which the stage "evaluate" leaves: means over the held-out photographs, and each one's

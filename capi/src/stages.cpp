@@ -1,7 +1,6 @@
 #include <lumihull/base/files.h>
 #include <lumihull/slf/pipeline.h>
 
-#include <charconv>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -15,27 +14,6 @@ using namespace lumihull::capi;
 using Json = nlohmann::ordered_json;
 
 namespace {
-
-std::string number_text(double x) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, x).ptr};
-}
-
-/// What slf::set_option_text reads.
-std::string value_text(const OptionValue& value) {
-  struct Visitor {
-    std::string operator()(bool v) const { return v ? "true" : "false"; }
-    std::string operator()(std::int64_t v) const { return std::to_string(v); }
-    std::string operator()(double v) const { return number_text(v); }
-    std::string operator()(const std::string& v) const { return v; }
-    std::string operator()(const std::vector<double>& v) const {
-      std::string text;
-      for (const double x : v) text += (text.empty() ? "" : ",") + number_text(x);
-      return text;
-    }
-  };
-  return std::visit(Visitor{}, value);
-}
 
 std::string options_json(std::string_view stage) {
   constexpr double kMax = std::numeric_limits<double>::max();
@@ -86,7 +64,8 @@ lh_status lh_capture_get_option(lh_context* ctx, const lh_capture* capture, cons
                                 char* buffer, size_t size, size_t* needed) {
   return guarded(ctx, [&] {
     const Capture& c = given(capture, "capture").value;
-    give_text(value_text(slf::effective_option(c, text(stage, "stage"), text(name, "name"))), buffer, size, needed);
+    give_text(slf::option_text(slf::effective_option(c, text(stage, "stage"), text(name, "name"))), buffer, size,
+              needed);
   });
 }
 
@@ -103,8 +82,8 @@ lh_status lh_capture_run_stage(lh_context* ctx, lh_capture* capture, const char*
 
 lh_status lh_capture_run(lh_context* ctx, lh_capture* capture, int32_t force, lh_stage_fn fn, void* user) {
   return guarded(ctx, [&](Job& job) {
-    for (const slf::StageResult& result : slf::run(given(capture, "capture").value, job, force != 0))
-      report(result, fn, user);
+    slf::run(given(capture, "capture").value, job, force != 0,
+             [&](const slf::StageResult& result) { report(result, fn, user); });
   });
 }
 

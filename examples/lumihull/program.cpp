@@ -44,18 +44,8 @@ std::string flag_name(const std::string& option) {
 }
 
 std::string shown(const OptionValue& value) {
-  struct Visitor {
-    std::string operator()(bool v) const { return v ? "true" : "false"; }
-    std::string operator()(std::int64_t v) const { return std::to_string(v); }
-    std::string operator()(double v) const {
-      char text[32];
-      std::snprintf(text, sizeof text, "%g", v);
-      return text;
-    }
-    std::string operator()(const std::string& v) const { return v.empty() ? "none" : v; }
-    std::string operator()(const std::vector<double>& v) const { return v.empty() ? "none" : "a list"; }
-  };
-  return std::visit(Visitor{}, value);
+  const std::string text = slf::option_text(value);
+  return text.empty() ? "none" : text;
 }
 
 }  // namespace
@@ -205,7 +195,9 @@ namespace {
 
 void say_result(Program& program, const slf::StageResult& result) {
   char line[160];
-  if (result.skipped)
+  if (result.skipped && result.record.finished.empty())
+    std::snprintf(line, sizeof line, "%-9s -", result.stage.c_str());
+  else if (result.skipped)
     std::snprintf(line, sizeof line, "%-9s nothing has changed since %s", result.stage.c_str(),
                   result.record.finished.c_str());
   else
@@ -246,10 +238,10 @@ void add_stage_verb(Program& program, const std::string& stage, const std::strin
     if (a->hold_out_given->count()) capture.set_hold_out(a->hold_out);
     std::vector<slf::StageResult> results;
     if (stage == "run")
-      results = slf::run(capture, program.job(), a->force);
+      results = slf::run(capture, program.job(), a->force,
+                         [&](const slf::StageResult& result) { say_result(program, result); });
     else
-      results = {slf::run_stage(capture, stage, program.job(), a->force)};
-    for (const slf::StageResult& result : results) say_result(program, result);
+      say_result(program, results.emplace_back(slf::run_stage(capture, stage, program.job(), a->force)));
     if (stage == "run") program.say("report    " + (capture.folder() / "report.html").string());
     if (program.json) std::cout << (json ? json(capture) : results_json(results) + "\n");
   });

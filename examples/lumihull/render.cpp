@@ -52,14 +52,14 @@ void render(Program& program, const Arguments& a) {
   const Capture capture = Capture::open(a.folder);
   const auto background = parse_background(a.background);
   const std::filesystem::path output = a.output.empty() ? capture.folder() / "render" : std::filesystem::path(a.output);
-  const bool lumigraph = a.method == "lumigraph";
+  const bool lumigraph = a.method == "lumigraph", texture = a.method == "mean_texture";
 
   // The texture lies on its own copy of the mesh, in textured.glb; the lumigraph needs the hull alone.
   slf::TexturedMesh textured;
-  if (lumigraph)
-    textured.mesh = hull::read_mesh(capture.hull_path());
-  else
+  if (texture)
     textured = slf::read_glb(capture.folder() / "textured.glb");
+  else
+    textured.mesh = hull::read_mesh(capture.hull_path());
   const hull::RayScene scene(textured.mesh);
   std::optional<slf::Lumigraph> blender;
   if (lumigraph) blender.emplace(textured.mesh, scene, slf::photos_of(capture, slf::training_shots(capture)));
@@ -80,7 +80,8 @@ void render(Program& program, const Arguments& a) {
   for (const slf::PathView& p : path) {
     job.check();
     slf::Rendering rendering = lumigraph ? blender->render(p.view, options, frame_job)
-                                         : slf::render_texture(textured, scene, p.view, options, frame_job);
+                               : texture ? slf::render_texture(textured, scene, p.view, options, frame_job)
+                                         : slf::render_shaded(textured.mesh, scene, p.view, options, frame_job);
     if (background) rendering.rgba = slf::composited(rendering.rgba, *background);
     write_png(output / (p.name + ".png"), rendering.rgba);
     job.advance();
@@ -99,8 +100,9 @@ void add_render(Program& program) {
       program.verb("render", "new views: PNG pictures along a path", [&program, a] { render(program, *a); });
   verb->add_option("capture", a->folder, "folder of the capture")->required();
   verb->add_option("-o,--output", a->output, "folder for the pictures [CAPTURE/render]");
-  verb->add_option("--method", a->method, "lumigraph (blends photographs) or texture (mean colours) [lumigraph]")
-      ->check(CLI::IsMember({"lumigraph", "texture"}));
+  verb->add_option("--method", a->method,
+                   "lumigraph (blends photographs), mean_texture or shaded (bare hull) [lumigraph]")
+      ->check(CLI::IsMember({"lumigraph", "mean_texture", "shaded"}));
   auto* turntable =
       verb->add_option("--turntable", a->frames, "so many frames around the object [60]")->check(CLI::Range(1, 100000));
   auto* cameras = verb->add_option("--cameras", a->cameras, "cameras from a JSON file")->excludes(turntable);

@@ -131,7 +131,7 @@ std::vector<PathView> turntable(const hull::Mesh& mesh, std::span<const View> ph
 std::vector<PathView> read_camera_path(const std::filesystem::path& file) {
   const Json document = internal::read_json(file);
   const JsonReader top(document, file.string());
-  internal::check_format(top, "lumihull-cameras", 1);
+  internal::check_format(top, "lumihull-camera-path", 1);
   const JsonReader views = top.at("views");
   const std::size_t count = views.array_size(kMostViews);
   if (count == 0) views.fail("at least one view");
@@ -172,7 +172,7 @@ void write_camera_path(const std::filesystem::path& file, std::span<const PathVi
                      {{"rotation_wxyz", {p.rotation.w(), p.rotation.x(), p.rotation.y(), p.rotation.z()}},
                       {"translation", {p.translation.x(), p.translation.y(), p.translation.z()}}}}});
   }
-  write_file(file, Json{{"format", "lumihull-cameras"}, {"version", 1}, {"views", list}}.dump(1) + "\n");
+  write_file(file, Json{{"format", "lumihull-camera-path"}, {"version", 1}, {"views", list}}.dump(1) + "\n");
 }
 
 std::vector<PathView> views_of_shots(const Capture& capture, std::span<const std::size_t> shots) {

@@ -85,26 +85,11 @@ double parse_number(const OptionSpec& spec, std::string_view text) {
   return x;
 }
 
-std::string value_text(const OptionValue& value) {
-  struct Visitor {
-    std::string operator()(bool v) const { return v ? "true" : "false"; }
-    std::string operator()(std::int64_t v) const { return std::to_string(v); }
-    std::string operator()(double v) const { return number_text(v); }
-    std::string operator()(const std::string& v) const { return v; }
-    std::string operator()(const std::vector<double>& v) const {
-      std::string text;
-      for (const double x : v) text += number_text(x) + ",";
-      return text;
-    }
-  };
-  return std::visit(Visitor{}, value);
-}
-
 std::string digest_of(const Capture& capture, const StageDefinition& stage) {
   InputDigest digest;
   digest.add("stage", std::string(stage.name) + " " + std::to_string(stage.version));
   for (const OptionSpec& spec : stage.options)
-    digest.add(spec.name, value_text(effective_option(capture, stage.name, spec.name)));
+    digest.add(spec.name, option_text(effective_option(capture, stage.name, spec.name)));
   stage.inputs(capture, digest);
   return digest.hex();
 }
@@ -156,6 +141,21 @@ void set_option_text(Capture& capture, std::string_view stage, std::string_view 
   set_option(capture, stage, name, std::move(value));
 }
 
+std::string option_text(const OptionValue& value) {
+  struct Visitor {
+    std::string operator()(bool v) const { return v ? "true" : "false"; }
+    std::string operator()(std::int64_t v) const { return std::to_string(v); }
+    std::string operator()(double v) const { return number_text(v); }
+    std::string operator()(const std::string& v) const { return v; }
+    std::string operator()(const std::vector<double>& v) const {
+      std::string text;
+      for (const double x : v) text += (text.empty() ? "" : ",") + number_text(x);
+      return text;
+    }
+  };
+  return std::visit(Visitor{}, value);
+}
+
 OptionValue effective_option(const Capture& capture, std::string_view stage, std::string_view name) {
   const OptionSpec& spec = specification(stage, name);
   const auto values = capture.options.find(stage);
@@ -197,7 +197,8 @@ StageResult run_stage(Capture& capture, std::string_view name, Job& job, bool fo
   return result;
 }
 
-std::vector<StageResult> run(Capture& capture, Job& job, bool force) {
+std::vector<StageResult> run(Capture& capture, Job& job, bool force,
+                             const std::function<void(const StageResult&)>& ended) {
   std::vector<StageResult> results;
   for (const Definition d : kDefinitions) {
     const StageDefinition& stage = d();
@@ -211,6 +212,7 @@ std::vector<StageResult> run(Capture& capture, Job& job, bool force) {
       left_out.said.push_back("left out: " + why);
       results.push_back(std::move(left_out));
     }
+    if (ended) ended(results.back());
   }
   return results;
 }

@@ -99,7 +99,7 @@ TEST_F(ProgramTest, RunsFromPhotographsToTheReport) {
   EXPECT_TRUE(fs::exists(mine_ / "t" / "frame_0002.png"));
   EXPECT_EQ(lumihull({"render", capture(), "--turntable", "3", "-o", mine_ / "t"}).status, 2) << "never overwrites";
   ASSERT_EQ(
-      lumihull({"render", capture(), "--held-out", "--method", "texture", "--background", "1,2,3", "-o", mine_ / "h"})
+      lumihull({"render", capture(), "--held-out", "--method", "mean_texture", "--background", "1,2,3", "-o", mine_ / "h"})
           .status,
       0);
   EXPECT_EQ(std::distance(fs::directory_iterator(mine_ / "h"), {}), 3);

@@ -69,7 +69,7 @@ TEST(CameraPath, FilesComeBackAsTheyWere) {
 
 TEST(CameraPath, EyeTargetAndUpDoInsteadOfAPose) {
   const test::TemporaryFolder folder;
-  write_file(folder / "p.json", R"({"format": "lumihull-cameras", "version": 1, "views":
+  write_file(folder / "p.json", R"({"format": "lumihull-camera-path", "version": 1, "views":
     [{"width": 64, "height": 48, "f": 60, "eye": [0, 4, 0], "target": [0, 0, 0], "up": [0, 0, 1]}]})");
   const auto path = slf::read_camera_path(folder / "p.json");
   EXPECT_EQ(path[0].name, "frame_0000");
@@ -80,7 +80,7 @@ TEST(CameraPath, EyeTargetAndUpDoInsteadOfAPose) {
 TEST(CameraPath, ComplaintsNameFileAndPlace) {
   const test::TemporaryFolder folder;
   const auto complaint = [&](const std::string& view) {
-    write_file(folder / "p.json", R"({"format": "lumihull-cameras", "version": 1, "views": [)" + view + "]}");
+    write_file(folder / "p.json", R"({"format": "lumihull-camera-path", "version": 1, "views": [)" + view + "]}");
     const Error e = test::expect_error([&] { slf::read_camera_path(folder / "p.json"); });
     EXPECT_EQ(e.code(), ErrorCode::bad_input);
     EXPECT_NE(e.subject().find("p.json"), std::string::npos);

@@ -43,7 +43,7 @@ LUMIHULL_API std::vector<PathView> turntable(const hull::Mesh& mesh, std::span<c
 
 /// Reads cameras from a JSON file:
 ///
-///     {"format": "lumihull-cameras", "version": 1,
+///     {"format": "lumihull-camera-path", "version": 1,
 ///      "views": [{"name": "left", "width": 1280, "height": 720, "f": 1500,
 ///                 "s": 1, "skew": 0, "u0": 640, "v0": 360, "k1": 0, "k2": 0, "k3": 0, "p1": 0, "p2": 0,
 ///                 "cam_from_world": {"rotation_wxyz": [1, 0, 0, 0], "translation": [0, 0, 2]}}]}

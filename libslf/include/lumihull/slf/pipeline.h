@@ -5,6 +5,7 @@
 #include <lumihull/base/job.h>
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <span>
 #include <string>
@@ -41,6 +42,8 @@ LUMIHULL_API void set_option(Capture& capture, std::string_view stage, std::stri
 /// The same from text: "150", "0.2", "true", "auto", "-1,2,3.5" (a list).
 LUMIHULL_API void set_option_text(Capture& capture, std::string_view stage, std::string_view name,
                                   std::string_view text);
+/// What set_option_text reads.
+LUMIHULL_API std::string option_text(const OptionValue& value);
 /// What counts for a stage: the stored value, else the default. Errors: invalid_argument, bad_input.
 LUMIHULL_API OptionValue effective_option(const Capture& capture, std::string_view stage, std::string_view name);
 
@@ -56,8 +59,10 @@ struct StageResult {
 /// result in place. Errors: those of the stage; not_found where an earlier stage's result is missing.
 LUMIHULL_API StageResult run_stage(Capture& capture, std::string_view stage, Job& job, bool force = false);
 
-/// All the stages that exist and are needed, in order.
-LUMIHULL_API std::vector<StageResult> run(Capture& capture, Job& job, bool force = false);
+/// All the stages that exist and are needed, in order. `ended` is called after each, on the caller's thread, so that
+/// what came of the first ones is known even where a later one fails.
+LUMIHULL_API std::vector<StageResult> run(Capture& capture, Job& job, bool force = false,
+                                          const std::function<void(const StageResult&)>& ended = {});
 
 /// What is in a capture as one JSON object: photographs, cameras, unit, masks, stages, notes.
 LUMIHULL_API std::string describe_json(const Capture& capture);
