@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <tuple>
 
@@ -83,10 +84,40 @@ std::optional<Box> meet_rays(std::span<const View> views, std::span<const Silhou
   return Box{point - half, point + half};
 }
 
-/// At most `most` of n indices, evenly spread.
-std::vector<std::size_t> spread(std::size_t n, std::size_t most) {
-  std::vector<std::size_t> chosen(std::min(n, most));
-  for (std::size_t k = 0; k < chosen.size(); ++k) chosen[k] = k * n / chosen.size();
+/// At most `most` views, as different as they can be, ascending: each next one is the farthest, in place and direction,
+/// from those that were chosen (Gonzalez 1985). Every n-th would follow the trajectory's own period, and might see the
+/// object from one side alone.
+std::vector<std::size_t> spread(std::span<const View> views, std::size_t most) {
+  const std::size_t n = views.size();
+  std::vector<std::size_t> chosen;
+  if (n <= most) {
+    for (std::size_t i = 0; i < n; ++i) chosen.push_back(i);
+    return chosen;
+  }
+  using Signature = Eigen::Matrix<double, 6, 1>;
+  std::vector<Signature> signatures;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const View& v : views) mean += v.center() / double(n);
+  double spread2 = 0;
+  for (const View& v : views) spread2 += (v.center() - mean).squaredNorm() / double(n);
+  const double unit = spread2 > 0 ? 1 / std::sqrt(spread2) : 0;
+  for (const View& v : views) {
+    // The middle of the picture: the principal point may lie far outside.
+    const Eigen::Vector2d d = v.camera.distorted_from_pixel({0.5 * v.camera.width, 0.5 * v.camera.height});
+    Signature s;
+    s << (v.center() - mean) * unit,
+        (v.cam_from_world.rotation.conjugate() * Eigen::Vector3d(d.x(), d.y(), 1)).normalized();
+    signatures.push_back(s);
+  }
+  std::vector<double> nearest(n, std::numeric_limits<double>::infinity());
+  for (std::size_t next = 0; chosen.size() < most;) {
+    chosen.push_back(next);
+    for (std::size_t i = 0; i < n; ++i)
+      nearest[i] = std::min(nearest[i], (signatures[i] - signatures[next]).squaredNorm());
+    next = std::size_t(std::max_element(nearest.begin(), nearest.end()) - nearest.begin());
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   return chosen;
 }
 
@@ -111,7 +142,7 @@ Box grown(Box box, double share) {
 Box find_region(std::span<const View> all_views, std::span<const Silhouette> all_silhouettes, const CarveRule& all_rule,
                 std::span<const std::string> all_names, Job& job) {
   { const HullFunction valid(all_views, all_silhouettes, all_rule); }
-  const std::vector<std::size_t> chosen = spread(all_views.size(), kRegionViews);
+  const std::vector<std::size_t> chosen = spread(all_views, kRegionViews);
   std::vector<View> views;
   std::vector<Silhouette> silhouettes;
   std::vector<std::string> names;
@@ -203,7 +234,7 @@ std::vector<Silhouette> make_silhouettes(std::span<const View> views, const std:
   };
   std::optional<Box> region = region_in;
   if (!region && !views.empty()) {
-    const std::vector<std::size_t> chosen = spread(views.size(), kCoarseViews);
+    const std::vector<std::size_t> chosen = spread(views, kCoarseViews);
     std::vector<std::optional<Silhouette>> coarse(chosen.size());
     parallel_for(job, chosen.size(), [&](std::size_t k) {
       const std::size_t i = chosen[k];

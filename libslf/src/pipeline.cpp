@@ -115,6 +115,11 @@ void set_option(Capture& capture, std::string_view stage, std::string_view name,
 
 void set_option_text(Capture& capture, std::string_view stage, std::string_view name, std::string_view text) {
   const OptionSpec& spec = specification(stage, name);
+  if (text == "default") {
+    if (const auto stored = capture.options.find(stage); stored != capture.options.end())
+      stored->second.erase(spec.name);
+    return;
+  }
   OptionValue value = std::string(text);
   if (std::holds_alternative<bool>(spec.fallback)) {
     if (text != "true" && text != "false" && text != "1" && text != "0")

@@ -39,7 +39,8 @@ LUMIHULL_API std::span<const OptionSpec> stage_options(std::string_view stage);
 /// Stores an option in the capture after checking its name, type and range (an integer is taken where a real number is
 /// expected). Errors: invalid_argument, saying what was expected.
 LUMIHULL_API void set_option(Capture& capture, std::string_view stage, std::string_view name, OptionValue value);
-/// The same from text: "150", "0.2", "true", "auto", "-1,2,3.5" (a list).
+/// The same from text: "150", "0.2", "true", "auto", "-1,2,3.5" (a list); "default" takes the stored
+/// value out again.
 LUMIHULL_API void set_option_text(Capture& capture, std::string_view stage, std::string_view name,
                                   std::string_view text);
 /// What set_option_text reads.
