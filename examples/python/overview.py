@@ -29,7 +29,11 @@ def main() -> None:
     mask = np.repeat(np.asarray(capture.read_mask(shot)).reshape(photo.shape[0], photo.shape[1], 1), 3, axis=2)
     hull = over(np.asarray(lumihull.Renderer(capture, "shaded").render(view, rays=3).rgba), (60, 60, 66))
     new = over(np.asarray(lumihull.Renderer(capture, "lumigraph").render(view, rays=3).rgba), (255, 255, 255))
-    row = np.concatenate([photo, mask, hull, new], axis=1)
+    rows, columns = np.nonzero(mask[:, :, 0] > 127)
+    margin = (rows.max() - rows.min()) // 8
+    top, left = max(rows.min() - margin, 0), max(columns.min() - margin, 0)
+    window = np.s_[top : rows.max() + margin, left : columns.max() + margin]
+    row = np.concatenate([photo[window], mask[window], hull[window], new[window]], axis=1)
     half = row[: row.shape[0] // 2 * 2, : row.shape[1] // 2 * 2].astype(np.float32)
     half = (half[0::2, 0::2] + half[1::2, 0::2] + half[0::2, 1::2] + half[1::2, 1::2]) / 4
     lumihull.write_png(output, half.astype(np.uint8))

@@ -160,7 +160,7 @@ TEST(ImportProjections, MixedHandednessNamesThePhotographs) {
 
 TEST(ImportProjections, WrongLinesAreNamed) {
   const auto message = [](const std::string& text) {
-    return expect_error([&] { internal::parse_projections(text, "P.txt"); }).what();
+    return std::string(expect_error([&] { internal::parse_projections(text, "P.txt"); }).what());
   };
   const std::string good = "a.png 1 0 0 0 0 1 0 0 0 0 1 5\n";
   EXPECT_THAT(message(good + "b.png 1 0 0 0 0 1 0 0 0 0 1\n"),
@@ -292,7 +292,7 @@ TEST(ImportMiddlebury, TheTempleProjectsAsItsFileSays) {
 
 TEST(ImportMiddlebury, WrongFilesAreErrors) {
   const auto message = [](const std::string& text) {
-    return expect_error([&] { internal::parse_middlebury(text, "par.txt"); }).what();
+    return std::string(expect_error([&] { internal::parse_middlebury(text, "par.txt"); }).what());
   };
   const std::string line = "a.png 100 0 40 0 100 30 0 0 1 1 0 0 0 1 0 0 0 1 0 0 5\n";
   EXPECT_EQ(internal::parse_middlebury("1\n" + line, "par.txt").size(), 1u);
