@@ -1,6 +1,6 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
-#include <lumihull/internal/json.h>
+#include <lumihull/internal/camera_json.h>
 #include <lumihull/slf/camera_path.h>
 
 #include <Eigen/Geometry>
@@ -27,10 +27,6 @@ Eigen::Vector3d vector_at(const JsonReader& r) {
   return {r.at(std::size_t(0)).number(), r.at(std::size_t(1)).number(), r.at(std::size_t(2)).number()};
 }
 
-double number_or(const JsonReader& r, std::string_view key, double fallback) {
-  return r.has(key) ? r.at(key).number() : fallback;
-}
-
 Pose pose_at(const JsonReader& r) {
   if (r.has("eye")) {
     const Eigen::Vector3d eye = vector_at(r.at("eye")), target = vector_at(r.at("target")), up = vector_at(r.at("up"));
@@ -46,24 +42,6 @@ Pose pose_at(const JsonReader& r) {
   const Eigen::Quaterniond rotation(w[0], w[1], w[2], w[3]);
   if (!(std::abs(rotation.norm() - 1) < 1e-3)) q.fail("a quaternion of length 1");
   return {rotation.normalized(), vector_at(pose.at("translation"))};
-}
-
-Camera camera_at(const JsonReader& r) {
-  Camera c;
-  c.width = int(r.at("width").integer(1, kMaxImageSide));
-  c.height = int(r.at("height").integer(1, kMaxImageSide));
-  if (std::int64_t(c.width) * c.height > kMaxImagePixels) r.fail("a picture of at most 400 megapixels");
-  c.f = r.at("f").number();
-  c.s = number_or(r, "s", 1), c.skew = number_or(r, "skew", 0);
-  c.u0 = number_or(r, "u0", 0.5 * c.width), c.v0 = number_or(r, "v0", 0.5 * c.height);
-  c.k1 = number_or(r, "k1", 0), c.k2 = number_or(r, "k2", 0), c.k3 = number_or(r, "k3", 0);
-  c.p1 = number_or(r, "p1", 0), c.p2 = number_or(r, "p2", 0);
-  try {
-    c.validate();
-  } catch (const Error& e) {
-    r.fail("a valid camera (" + e.message() + ")");
-  }
-  return c;
 }
 
 }  // namespace
@@ -144,7 +122,7 @@ std::vector<PathView> read_camera_path(const std::filesystem::path& file) {
     if (view.name.empty() || view.name[0] == '.' || view.name.find('/') != std::string::npos)
       r.at("name").fail("a file name without '/' that does not begin with a dot");
     if (!names.insert(view.name).second) r.fail("names that are not repeated (\"" + view.name + "\")");
-    view.view = {camera_at(r), pose_at(r)};
+    view.view = {internal::read_camera(r, false), pose_at(r)};
     path.push_back(std::move(view));
   }
   return path;
@@ -153,26 +131,15 @@ std::vector<PathView> read_camera_path(const std::filesystem::path& file) {
 void write_camera_path(const std::filesystem::path& file, std::span<const PathView> views) {
   Json list = Json::array();
   for (const PathView& v : views) {
-    const Camera& c = v.view.camera;
     const Pose& p = v.view.cam_from_world;
-    list.push_back({{"name", v.name},
-                    {"width", c.width},
-                    {"height", c.height},
-                    {"f", c.f},
-                    {"s", c.s},
-                    {"skew", c.skew},
-                    {"u0", c.u0},
-                    {"v0", c.v0},
-                    {"k1", c.k1},
-                    {"k2", c.k2},
-                    {"k3", c.k3},
-                    {"p1", c.p1},
-                    {"p2", c.p2},
-                    {"cam_from_world",
-                     {{"rotation_wxyz", {p.rotation.w(), p.rotation.x(), p.rotation.y(), p.rotation.z()}},
-                      {"translation", {p.translation.x(), p.translation.y(), p.translation.z()}}}}});
+    Json view{{"name", v.name}};
+    view.update(internal::print_camera(v.view.camera));
+    view["cam_from_world"] = {{"rotation_wxyz", {p.rotation.w(), p.rotation.x(), p.rotation.y(), p.rotation.z()}},
+                              {"translation", {p.translation.x(), p.translation.y(), p.translation.z()}}};
+    list.push_back(std::move(view));
   }
-  write_file(file, Json{{"format", "lumihull-camera-path"}, {"version", 1}, {"views", list}}.dump(1) + "\n");
+  const Json document{{"format", "lumihull-camera-path"}, {"version", 1}, {"views", list}};
+  write_file(file, internal::print_json(document, file.string()));
 }
 
 std::vector<PathView> views_of_shots(const Capture& capture, std::span<const std::size_t> shots) {

@@ -1,6 +1,9 @@
+#include <fcntl.h>
 #include <lumihull/base/capture.h>
 #include <lumihull/base/files.h>
+#include <sys/stat.h>
 
+#include <cmath>
 #include <fstream>
 
 #include "support.h"
@@ -95,10 +98,13 @@ TEST(Capture, WrongFieldsAreNamedByPointer) {
     write_file(folder / "c" / "capture.json", good);
     EXPECT_THAT(e.what(), AllOf(HasSubstr("cameras.json"), HasSubstr("/cameras"), HasSubstr("p0")));
   }
-  EXPECT_THAT(complaint("capture.json", good, "\"seconds\": 1.5", "\"seconds\": -1"), HasSubstr("/stages/key/seconds"));
+  EXPECT_THAT(complaint("capture.json", good, "\"seconds\": 1.5", "\"seconds\": -1"),
+              HasSubstr("/stages/key/seconds: expected a number of at least 0"));
+  EXPECT_THAT(complaint("capture.json", good, "\"hold_out\": 2", "\"hold_out\": 1"), HasSubstr("/evaluate/hold_out"));
+  EXPECT_THAT(complaint("capture.json", good, "\"name\": \"p1\"", "\"name\": \"p\\n1\""), HasSubstr("/shots/1/name"));
   EXPECT_THAT(complaint("capture.json", good, "{", "["), HasSubstr("JSON"));
   EXPECT_THAT(complaint("cameras.json", cameras, "\"f\": 10.0", "\"f\": -10"), HasSubstr("/cameras/0/f"));
-  EXPECT_THAT(complaint("cameras.json", cameras, "\"f\": 10.0", "\"f\": 1e999"), HasSubstr(""));
+  EXPECT_THAT(complaint("cameras.json", cameras, "\"f\": 10.0", "\"f\": 1e999"), HasSubstr("1e999"));
   EXPECT_THAT(complaint("cameras.json", cameras, "0.5,", "0.6,"), HasSubstr("/cam_from_world/p0/q"));
   EXPECT_THAT(complaint("cameras.json", cameras, "\"p2\": {", "\"p9\": {"), HasSubstr("/cam_from_world/p9"));
 }
@@ -157,6 +163,65 @@ TEST(Capture, MasksOfAKilledRunAreNotTakenForDrawnOnes) {
   fs::create_directories(folder / "c" / "masks");
   write_png(c.mask_path(c.shots[2]), drawn);
   EXPECT_EQ(Capture::open(folder / "c").mask_state(c.shots[2]), MaskSource::edited);
+}
+
+TEST(Capture, MasksOfAKilledRunAreFoundWhateverTheirShotsAreCalled) {
+  const test::TemporaryFolder folder;
+  Capture c = small_capture(folder / "c");
+  c.shots[0].name = "  two  words ";
+  c.save();
+  c.write_mask(0, Image(8, 6, 1), MaskSource::keyed);
+  c.write_mask(1, Image(8, 6, 1), MaskSource::imported);
+  const Capture again = Capture::open(folder / "c");
+  EXPECT_EQ(again.mask_state(again.shots[0]), MaskSource::keyed);
+  EXPECT_EQ(again.mask_state(again.shots[1]), MaskSource::imported);
+}
+
+TEST(Capture, WhatCouldNotBeReadAgainIsNotSaved) {
+  const test::TemporaryFolder folder;
+  const Capture good = small_capture(folder / "c");
+  good.save();
+  const std::string main = read_file(folder / "c" / "capture.json"), cameras = read_file(folder / "c" / "cameras.json");
+  const auto refused = [&](const std::function<void(Capture&)>& spoil) {
+    Capture bad = good;
+    spoil(bad);
+    const Error e = test::expect_error([&] { bad.save(); });
+    EXPECT_EQ(e.code(), ErrorCode::bad_input);
+    EXPECT_EQ(read_file(folder / "c" / "capture.json"), main);
+    EXPECT_EQ(read_file(folder / "c" / "cameras.json"), cameras);
+    return std::string(e.what());
+  };
+  EXPECT_THAT(refused([](Capture& c) { c.options["hull"]["x"] = std::nan(""); }), HasSubstr("/options/hull/x"));
+  EXPECT_THAT(refused([](Capture& c) { c.shots[1].name = "p0"; }), HasSubstr("/shots/1/name"));
+  EXPECT_THAT(refused([](Capture& c) { c.notes = {"caf\xe9"}; }), HasSubstr("UTF-8"));
+  EXPECT_THAT(refused([](Capture& c) { c.cameras[0].u0 = INFINITY; }), HasSubstr("/cameras/0/u0"));
+  EXPECT_THAT(refused([](Capture& c) { c.shots[0].cam_from_world->translation.x() = NAN; }),
+              HasSubstr("/cam_from_world/p0/t"));
+  EXPECT_THAT(refused([](Capture& c) { c.cameras.clear(); }), HasSubstr("camera 0"));
+  fs::remove(folder / "c" / "cameras.json");
+  EXPECT_THAT(test::expect_error([&] { Capture::open(folder / "c"); }).subject(), HasSubstr("cameras.json"));
+}
+
+TEST(Capture, ShotsAreAddedUnderPlainNames) {
+  const test::TemporaryFolder folder;
+  Capture c = small_capture(folder / "c");
+  for (const char* name : {"", ".", "..", "a/b", "a\nb", "caf\xe9", "p1"})
+    EXPECT_EQ(test::expect_error([&] { c.add_shot(name, "photos/p1.png", 0); }).code(), ErrorCode::invalid_argument)
+        << name;
+  EXPECT_EQ(test::expect_error([&] { c.add_shot("new", "photos/p1.png", 1); }).subject(), "camera");
+  EXPECT_EQ(test::expect_error([&] { c.add_shot("new", "photos/none.png", 0); }).code(), ErrorCode::not_found);
+  EXPECT_EQ(c.add_shot("caf\xc3\xa9 1", "photos/p1.png", 0), 3u);
+  c.save();
+  EXPECT_EQ(Capture::open(folder / "c").shots[3].name, "caf\xc3\xa9 1");
+}
+
+TEST(Capture, StampsBearFilesOfAnyYear) {
+  const test::TemporaryFolder folder;
+  write_file(folder / "a", "one");
+  const timespec times[2] = {{10'000'000'000, 5}, {10'000'000'000, 5}};  // the year 2286
+  ASSERT_EQ(utimensat(AT_FDCWD, (folder / "a").c_str(), times, 0), 0);
+  const FileStamp first = Capture::stamp(folder / "a");
+  EXPECT_EQ(Capture::stamp(folder / "a", first).mtime_ns, first.mtime_ns);
 }
 
 TEST(Capture, StampsSeeAChangedFile) {

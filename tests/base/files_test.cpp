@@ -88,6 +88,42 @@ TEST(Files, KilledWhileWritingLeavesOldOrNew) {
     const std::string now = read_file(folder / "x");
     EXPECT_TRUE(now == first || now == second) << "round " << round;
   }
+  write_file(folder / "x", "end");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1) << "the next write takes away what was left";
+}
+
+TEST(Files, AKilledWritersLeftoverGoesAndARunningOnesStays) {
+  const test::TemporaryFolder folder;
+  const auto files = [&] { return std::distance(fs::directory_iterator(folder.path()), {}); };
+  const pid_t child = fork();
+  if (child == 0) {
+    AtomicFile half(folder / "x");
+    half.write("half");
+    kill(getpid(), SIGKILL);
+  }
+  waitpid(child, nullptr, 0);
+  ASSERT_EQ(files(), 1) << "the killed process has left its unfinished file";
+  AtomicFile running(folder / "x");
+  running.write("slow");
+  EXPECT_EQ(files(), 1) << "its place was taken";
+  write_file(folder / "x", "fast");
+  EXPECT_EQ(read_file(folder / "x"), "fast");
+  EXPECT_EQ(files(), 2) << "nobody takes a file away that is being written";
+  running.commit();
+  EXPECT_EQ(read_file(folder / "x"), "slow");
+  EXPECT_EQ(files(), 1);
+}
+
+TEST(Error, IsOneLineOfUtf8WhateverAFileHolds) {
+  const Error e(ErrorCode::bad_input, "no camera \"a\nb\x1b[31m\xff\"", "tr\xc3\xa8s\x07/\xc2\x9b\xed\xa0\x80");
+  EXPECT_EQ(e.message(), "no camera \"a?b?[31m?\"");
+  EXPECT_EQ(e.subject(),
+            "tr\xc3\xa8s?/?"
+            "?"
+            "?"
+            "?"
+            "?");
+  EXPECT_EQ(e.what(), e.subject() + ": " + e.message());
 }
 
 TEST(Files, Sha256OfPublishedVectors) {

@@ -2,7 +2,9 @@
 
 #include <lumihull/base/files.h>
 #include <lumihull/base/image.h>
+#include <sys/stat.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <random>
@@ -69,6 +71,13 @@ TEST(Fault, EmptyFileFolderMissingFileAndNotAPicture) {
   }
 }
 
+TEST(Fault, APipeIsRefusedAndNotWaitedFor) {
+  const test::TemporaryFolder folder;
+  ASSERT_EQ(mkfifo((folder / "pipe.jpg").c_str(), 0600), 0);
+  EXPECT_EQ(expect_error([&] { read_image(folder / "pipe.jpg"); }).code(), ErrorCode::bad_input);
+  EXPECT_EQ(expect_error([&] { read_image_info(folder / "pipe.jpg"); }).code(), ErrorCode::bad_input);
+}
+
 TEST(Fault, TooLargeAFileIsNotRead) {
   const test::TemporaryFolder folder;
   write_jpeg(folder / "a.jpg", pattern(64, 64, 3));
@@ -129,6 +138,26 @@ TEST(Fault, AJpegWithDamagedScanIsAnErrorAndNotAGreyPicture) {
   jpeg[jpeg.size() / 2] = '\xff';
   jpeg[jpeg.size() / 2 + 1] = '\xd9';
   EXPECT_EQ(expect_error([&] { decode_image(bytes_of(jpeg), "a.jpg"); }).code(), ErrorCode::bad_input);
+}
+
+TEST(Fault, StrayBytesThatCamerasLeaveBeforeTheEndOfAJpegAreHarmless) {
+  const std::string jpeg = encode_jpeg(pattern(200, 150, 3));
+  const Image clean = decode_image(bytes_of(jpeg), "a.jpg");
+  const auto with = [&](const std::string& stray) { return jpeg.substr(0, jpeg.size() - 2) + stray + "\xff\xd9"; };
+  for (const std::string& stray :
+       {std::string("\x7f"), std::string("\x12\x34"), std::string(1, '\0'), std::string(3000, '\0'),
+        std::string(40, '\xff'), std::string("\xff\0\xff\0\0\0\0\0\0\0\0\0\0", 13)}) {
+    SCOPED_TRACE(stray.size());
+    const Image image = decode_image(bytes_of(with(stray)), "a.jpg");
+    ASSERT_EQ(image.bytes(), clean.bytes());
+    EXPECT_EQ(std::memcmp(image.data(), clean.data(), clean.bytes()), 0);
+  }
+  // More than that is the rest of a scan whose damage made it end early.
+  const std::string rest = jpeg.substr(jpeg.size() - 42, 40);
+  EXPECT_EQ(expect_error([&] { decode_image(bytes_of(with(rest)), "a.jpg"); }).code(), ErrorCode::bad_input);
+  // No padding makes up for rows that are missing.
+  std::string cut = jpeg.substr(0, jpeg.size() / 2) + std::string(jpeg.size() / 2, '\0') + "\xff\xd9";
+  EXPECT_EQ(expect_error([&] { decode_image(bytes_of(cut), "a.jpg"); }).code(), ErrorCode::bad_input);
 }
 
 TEST(Fault, CmykIsUnsupportedAndSaysWhatToDo) {

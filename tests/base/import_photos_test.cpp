@@ -1,5 +1,8 @@
+#include <fcntl.h>
 #include <lumihull/base/files.h>
 #include <lumihull/base/import.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <cmath>
 
@@ -70,6 +73,53 @@ TEST(ImportPhotos, NothingAndNonPicturesAreErrors) {
   write_file(folder / "a.jpg", "words");
   EXPECT_EQ(expect_error([&] { import_list(folder, {folder / "a.jpg"}); }).subject(), (folder / "a.jpg").string());
   EXPECT_FALSE(fs::exists(folder / "capture"));
+}
+
+TEST(ImportPhotos, NamesOfAnyBytesBecomeNamesThatACaptureHolds) {
+  const test::TemporaryFolder folder;
+  const std::string picture = encode_png(test::pattern(8, 8, 3));
+  std::string accents = "a";
+  for (int i = 0; i < 80; ++i) accents += "\xc3\xa9";
+  const std::vector<std::string> names{"caf\xe9.png",    "caf\xe8.png",  "line\nbreak.png",
+                                       accents + ".png", "no_extension", "x.\xff\xfe"};
+  std::vector<fs::path> files;
+  for (const std::string& name : names) {
+    write_file(folder / name, picture);
+    files.push_back(folder / name);
+  }
+  const Capture capture = import_list(folder, files);
+  ASSERT_EQ(capture.shots.size(), names.size());
+  for (std::size_t i = 0; i < names.size(); ++i) EXPECT_EQ(capture.read_photo(i).width(), 8) << i;
+  EXPECT_EQ(capture.shots[0].name, "caf_");
+  EXPECT_EQ(capture.shots[2].name, "line_break");
+  EXPECT_EQ(capture.shots[3].name, accents.substr(0, 119)) << "cut between characters";
+  EXPECT_EQ(capture.shots[4].file, "photos/no_extension");
+  Capture again = Capture::open(folder / "capture");
+  Job job;
+  EXPECT_EQ(import_enclosure(again, files, false, job), int(names.size()));
+  EXPECT_EQ(Capture::open(folder / "capture").enclosure.size(), names.size());
+
+  ImportOptions options;
+  options.output = folder / "referring";
+  options.reference = true;
+  const Error error = expect_error([&] { import_photos(std::span(files).first(1), options, job); });
+  EXPECT_EQ(error.code(), ErrorCode::unsupported);
+  EXPECT_THAT(error.subject(), testing::HasSubstr("caf?"));
+}
+
+TEST(ImportPhotos, AKilledImportsLeftoverGoesAndARunningOnesStays) {
+  const test::TemporaryFolder folder;
+  write_png(folder / "a.png", test::pattern(8, 8, 3));
+  for (const char* name : {".capture.importing-0", ".capture.importing-1"}) {
+    fs::create_directories(folder / name / "photos");
+    write_file(folder / name / "photos/a.png", "half a photograph");
+  }
+  const int running = open((folder / ".capture.importing-0").c_str(), O_RDONLY | O_DIRECTORY);
+  ASSERT_EQ(flock(running, LOCK_EX), 0);
+  import_list(folder, {folder / "a.png"});
+  close(running);
+  EXPECT_TRUE(fs::exists(folder / ".capture.importing-0/photos/a.png"));
+  EXPECT_FALSE(fs::exists(folder / ".capture.importing-1"));
 }
 
 class Masks : public testing::Test {

@@ -1,6 +1,10 @@
 #include <lumihull/base/job.h>
 #include <lumihull/base/parallel.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <fstream>
 #include <numeric>
 #include <vector>
 
@@ -65,6 +69,37 @@ TEST(Parallel, EveryItemOnceForAnyNumberOfThreads) {
       EXPECT_EQ(std::count(count.begin(), count.end(), 1), long(n));
     }
   }
+}
+
+TEST(Parallel, WhereNoMoreThreadsAreToBeHadFewerDoItAll) {
+  EXPECT_EQ(Job({}, 4'000'000'000u).threads(), 1024u);
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer's own memory is beyond any limit";
+#endif
+  const pid_t child = fork();
+  if (child == 0) {
+    // Room for a few stacks of 8 MB beside what is there, far from 1000.
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    const rlim_t room = pages * std::size_t(sysconf(_SC_PAGESIZE)) + (std::size_t(200) << 20);
+    const rlimit limit{room, room};
+    setrlimit(RLIMIT_AS, &limit);
+    Job job({}, 1000);
+    std::atomic<int> done{0};
+    try {
+      parallel_for(job, 3000, [&](std::size_t) {
+        ++done;
+        usleep(1000);
+      });
+    } catch (const std::exception&) {
+      _exit(8);
+    }
+    _exit(done == 3000 ? 7 : 9);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 7);
 }
 
 TEST(Parallel, AnExceptionReachesTheCaller) {

@@ -72,7 +72,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         parse_capture_json(text, "fuzz", capture);
         // What was read can be written and read again.
         Capture again = empty_capture();
-        parse_capture_json(print_capture_json(capture), "again", again);
+        parse_capture_json(print_capture_json(capture, "again"), "again", again);
         if (again.shots.size() != capture.shots.size()) std::abort();
         break;
       }

@@ -6,12 +6,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <sstream>
 #include <system_error>
 
 #include "capture_json.h"
+#include "import_common.h"
+#include "text.h"
 
 namespace lumihull {
 
@@ -34,12 +37,6 @@ void append_line(const fs::path& file, const std::string& line) {
   if (!good) throw Error(ErrorCode::io, std::string("can't write: ") + std::strerror(error), file.string());
 }
 
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw Error(ErrorCode::io, "can't make the folder: " + error.message(), folder.string());
-}
-
 }  // namespace
 
 Capture Capture::create(const fs::path& folder) {
@@ -50,7 +47,7 @@ Capture Capture::create(const fs::path& folder) {
     if (!fs::is_empty(folder, error))
       throw Error(ErrorCode::invalid_argument, "the folder is in use; name a new or empty one", folder.string());
   }
-  make_folder(folder);
+  internal::make_folder(folder);
   return Capture(folder);
 }
 
@@ -62,8 +59,7 @@ Capture Capture::open(const fs::path& folder) {
                 folder.string());
   Capture capture(folder);
   internal::parse_capture_json(read_file(main, kMaxJsonBytes), main.string(), capture);
-  if (fs::exists(cameras, error))
-    internal::parse_cameras_json(read_file(cameras, kMaxJsonBytes), cameras.string(), capture);
+  internal::parse_cameras_json(read_file(cameras, kMaxJsonBytes), cameras.string(), capture);
   capture.absorb_mask_journal();
   return capture;
 }
@@ -75,7 +71,7 @@ void Capture::absorb_mask_journal() {
   for (Shot& shot : shots) by_name[shot.name] = &shot;
   std::istringstream lines(read_file(mask_journal(folder_), kMaxJsonBytes));
   std::string source, digest, name;
-  while (lines >> source >> digest && std::getline(lines >> std::ws, name)) {
+  while (lines >> source >> digest && lines.ignore(1) && std::getline(lines, name)) {
     const auto shot = by_name.find(name);
     if (shot == by_name.end() || !fs::exists(mask_path(*shot->second), error)) continue;
     if (sha256_of_file(mask_path(*shot->second)) != digest) continue;
@@ -85,10 +81,17 @@ void Capture::absorb_mask_journal() {
 }
 
 void Capture::save() const {
-  make_folder(folder_);
+  const fs::path main = folder_ / "capture.json", beside = folder_ / "cameras.json";
+  const std::string main_text = internal::print_capture_json(*this, main.string()),
+                    cameras_text = internal::print_cameras_json(*this, beside.string());
+  // What could not be read again (a number that is not finite, a name used twice) must not replace what can.
+  Capture again(folder_);
+  internal::parse_capture_json(main_text, main.string(), again);
+  internal::parse_cameras_json(cameras_text, beside.string(), again);
+  internal::make_folder(folder_);
   // Cameras first: a shot must never refer to a camera that is not on disk yet.
-  write_file(folder_ / "cameras.json", internal::print_cameras_json(*this));
-  write_file(folder_ / "capture.json", internal::print_capture_json(*this));
+  write_file(beside, cameras_text);
+  write_file(main, main_text);
   std::error_code ignored;
   fs::remove(mask_journal(folder_), ignored);  // capture.json holds the digests now
 }
@@ -99,6 +102,23 @@ void Capture::set_hold_out(int n) {
   if (n < 0 || n == 1)
     throw Error(ErrorCode::invalid_argument, "expected 0 (none) or at least 2, found " + std::to_string(n), "hold-out");
   options["evaluate"]["hold_out"] = std::int64_t(n);
+}
+
+std::size_t Capture::add_shot(const std::string& name, const std::string& file, std::size_t camera) {
+  if (!internal::is_shot_name(name))
+    throw Error(ErrorCode::invalid_argument, std::string("expected ") + internal::kShotName, "name");
+  if (camera >= cameras.size())
+    throw Error(ErrorCode::invalid_argument,
+                "expected less than " + std::to_string(cameras.size()) + ", found " + std::to_string(camera), "camera");
+  if (std::any_of(shots.begin(), shots.end(), [&](const Shot& s) { return s.name == name; }))
+    throw Error(ErrorCode::invalid_argument, "expected a name that no other shot has, found \"" + name + "\"", "name");
+  Shot shot;
+  shot.name = name;
+  shot.file = file;
+  shot.camera = int(camera);
+  shot.stamp = stamp(photo_path(shot));
+  shots.push_back(std::move(shot));
+  return shots.size() - 1;
 }
 
 fs::path Capture::photo_path(const Shot& shot) const {
@@ -152,7 +172,7 @@ void Capture::write_mask(std::size_t i, const Image& mask, MaskSource source) {
   if (mask.type() != PixelType::u8 || mask.channels() != 1 || mask.width() != camera.width ||
       mask.height() != camera.height)
     throw Error(ErrorCode::invalid_argument, "a mask is 8-bit, one channel, of its photograph's size", shot.name);
-  make_folder(folder_ / "masks");
+  internal::make_folder(folder_ / "masks");
   const std::string png = encode_png(mask, {.compression = 1, .filter = false});
   const std::string digest = sha256(png);
   append_line(mask_journal(folder_),
@@ -177,8 +197,9 @@ FileStamp Capture::stamp(const fs::path& file, const FileStamp& known) {
     throw Error(error == ENOENT || error == ENOTDIR ? ErrorCode::not_found : ErrorCode::io,
                 std::string("can't look at the photograph: ") + std::strerror(error), file.string());
   }
-  FileStamp now{known.sha256, std::uint64_t(status.st_size),
-                std::int64_t(status.st_mtim.tv_sec) * 1'000'000'000 + status.st_mtim.tv_nsec};
+  // Unsigned, for a file may claim to be of any year: what overflows still differs from another time.
+  const auto mtime_ns = std::uint64_t(status.st_mtim.tv_sec) * 1'000'000'000 + std::uint64_t(status.st_mtim.tv_nsec);
+  FileStamp now{known.sha256, std::uint64_t(status.st_size), std::int64_t(mtime_ns)};
   if (known.sha256.empty() || now.size != known.size || now.mtime_ns != known.mtime_ns)
     now.sha256 = sha256_of_file(file);
   return now;

@@ -1,9 +1,10 @@
 #include "capture_json.h"
 
-#include <lumihull/internal/json.h>
+#include <lumihull/internal/camera_json.h>
 
 #include <set>
-#include <utility>
+
+#include "text.h"
 
 namespace lumihull::internal {
 
@@ -14,9 +15,8 @@ constexpr std::size_t kMaxCameras = 100'000;
 constexpr const char* kMaskSources[] = {"none", "keyed", "imported", "edited"};
 
 std::string read_name(const JsonReader& json) {
-  std::string name = json.string(200);
-  if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos)
-    json.fail("a name without '/', not empty");
+  std::string name = json.string();
+  if (!is_shot_name(name)) json.fail(kShotName);
   return name;
 }
 
@@ -79,7 +79,7 @@ OptionValue read_option(const JsonReader& json) {
   if (v.is_boolean()) return v.get<bool>();
   if (v.is_number_integer()) return json.integer(INT64_MIN, INT64_MAX);
   if (v.is_number()) return json.number();
-  if (v.is_string()) return json.string();
+  if (v.is_string()) return json.string(1 << 20);  // regions of many photographs are named in one text
   if (v.is_array()) {
     std::vector<double> list;
     const std::size_t n = json.array_size(4096);
@@ -106,7 +106,7 @@ void parse_capture_json(std::string_view text, const std::string& name, Capture&
   }
   if (top.has("notes")) {
     const JsonReader notes = top.at("notes");
-    const std::size_t n = notes.array_size(10'000);
+    const std::size_t n = notes.array_size(kMaxCameras);  // an importer may have a word on each
     for (std::size_t i = 0; i < n; ++i) capture.notes.push_back(notes.at(i).string());
   }
   std::set<std::string> names, enclosure_names;
@@ -122,7 +122,8 @@ void parse_capture_json(std::string_view text, const std::string& name, Capture&
         capture.options[stage.key()][option.key()] = read_option(options.at(option.key()));
     }
     if (capture.options.contains("evaluate") && stages.at("evaluate").has("hold_out"))
-      stages.at("evaluate").at("hold_out").integer(0, kMaxShots);
+      if (const JsonReader n = stages.at("evaluate").at("hold_out"); n.integer(0, kMaxShots) == 1)
+        n.fail("0 (none) or at least 2");
   }
   if (top.has("stages")) {
     const JsonReader stages = top.at("stages");
@@ -138,21 +139,21 @@ void parse_capture_json(std::string_view text, const std::string& name, Capture&
   }
 }
 
-std::string print_capture_json(const Capture& capture) {
+std::string print_capture_json(const Capture& capture, const std::string& name) {
   Json json{{"format", "lumihull-capture"}, {"version", 1}, {"unit", capture.unit == Unit::metres ? "m" : "unknown"}};
   if (capture.background_rgb) json["background_rgb"] = *capture.background_rgb;
   if (!capture.notes.empty()) json["notes"] = capture.notes;
   Json options = Json::object();
   for (const auto& [stage, values] : capture.options)
-    for (const auto& [name, value] : values)
-      std::visit([&, &stage = stage, &name = name](const auto& v) { options[stage][name] = v; }, value);
+    for (const auto& [option, value] : values)
+      std::visit([&, &stage = stage, &option = option](const auto& v) { options[stage][option] = v; }, value);
   if (!options.empty()) json["options"] = std::move(options);
   Json stages = Json::object();
-  for (const auto& [name, record] : capture.stages)
-    stages[name] = {{"digest", record.digest},
-                    {"seconds", record.seconds},
-                    {"peak_bytes", record.peak_bytes},
-                    {"finished", record.finished}};
+  for (const auto& [stage, record] : capture.stages)
+    stages[stage] = {{"digest", record.digest},
+                     {"seconds", record.seconds},
+                     {"peak_bytes", record.peak_bytes},
+                     {"finished", record.finished}};
   if (!stages.empty()) json["stages"] = std::move(stages);
   Json shots = Json::array();
   for (const Shot& shot : capture.shots) shots.push_back(print_shot(shot, false));
@@ -162,7 +163,7 @@ std::string print_capture_json(const Capture& capture) {
     for (const Shot& shot : capture.enclosure) enclosure.push_back(print_shot(shot, true));
     json["enclosure"] = std::move(enclosure);
   }
-  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return print_json(json, name);
 }
 
 void parse_cameras_json(std::string_view text, const std::string& name, Capture& capture) {
@@ -172,19 +173,7 @@ void parse_cameras_json(std::string_view text, const std::string& name, Capture&
 
   const JsonReader cameras = top.at("cameras");
   const std::size_t n = cameras.array_size(kMaxCameras);
-  for (std::size_t i = 0; i < n; ++i) {
-    const JsonReader json = cameras.at(i);
-    Camera c;
-    c.width = int(json.at("width").integer(1, kMaxImageSide));
-    c.height = int(json.at("height").integer(1, kMaxImageSide));
-    c.f = json.at("f").number(1e-9);
-    const std::pair<const char*, double*> fields[] = {{"s", &c.s},   {"skew", &c.skew}, {"u0", &c.u0},
-                                                      {"v0", &c.v0}, {"k1", &c.k1},     {"k2", &c.k2},
-                                                      {"k3", &c.k3}, {"p1", &c.p1},     {"p2", &c.p2}};
-    for (const auto& [field, value] : fields) *value = json.at(field).number();
-    if (!(c.s > 0)) json.at("s").fail("a positive number");
-    capture.cameras.push_back(c);
-  }
+  for (std::size_t i = 0; i < n; ++i) capture.cameras.push_back(read_camera(cameras.at(i), true));
 
   std::map<std::string, Shot*, std::less<>> by_name;
   for (Shot& shot : capture.shots) {
@@ -212,21 +201,9 @@ void parse_cameras_json(std::string_view text, const std::string& name, Capture&
   }
 }
 
-std::string print_cameras_json(const Capture& capture) {
+std::string print_cameras_json(const Capture& capture, const std::string& name) {
   Json cameras = Json::array();
-  for (const Camera& c : capture.cameras)
-    cameras.push_back({{"width", c.width},
-                       {"height", c.height},
-                       {"f", c.f},
-                       {"s", c.s},
-                       {"skew", c.skew},
-                       {"u0", c.u0},
-                       {"v0", c.v0},
-                       {"k1", c.k1},
-                       {"k2", c.k2},
-                       {"k3", c.k3},
-                       {"p1", c.p1},
-                       {"p2", c.p2}});
+  for (const Camera& c : capture.cameras) cameras.push_back(print_camera(c));
   Json poses = Json::object();
   for (const Shot& shot : capture.shots) {
     if (!shot.cam_from_world) continue;
@@ -235,7 +212,7 @@ std::string print_cameras_json(const Capture& capture) {
     poses[shot.name] = {{"q", {q.w(), q.x(), q.y(), q.z()}}, {"t", {t.x(), t.y(), t.z()}}};
   }
   const Json json{{"format", "lumihull-cameras"}, {"version", 1}, {"cameras", cameras}, {"cam_from_world", poses}};
-  return json.dump(1) + "\n";
+  return print_json(json, name);
 }
 
 }  // namespace lumihull::internal

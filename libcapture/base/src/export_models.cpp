@@ -4,7 +4,6 @@
 #include <lumihull/base/export.h>
 #include <lumihull/base/files.h>
 #include <lumihull/internal/json.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include <set>
 
 #include "colmap_model.h"
+#include "import_common.h"
 #include "lens_models.h"
 
 namespace lumihull {
@@ -87,8 +87,7 @@ ExportReport export_colmap(const Capture& capture, const fs::path& folder, const
   if (std::any_of(names.begin(), names.end(), [](const auto& n) { return n.find(' ') != std::string::npos; }))
     report.notes.push_back("some photographs' names hold blanks, at which COLMAP cuts them off");
 
-  fs::create_directories(folder, error);
-  if (error) throw Error(ErrorCode::io, "can't make the folder: " + error.message(), folder.string());
+  make_folder(folder);
   // images.txt comes last: COLMAP reads no folder without it.
   write_file(folder / "cameras.txt", print_colmap_cameras(model));
   write_file(folder / "points3D.txt", "# 3D point list: none\n");
@@ -138,7 +137,7 @@ ExportReport export_nerf(const Capture& capture, const fs::path& file, const Exp
   Json document;
   document["camera_model"] = distorted ? "OPENCV" : "PINHOLE";
   document["frames"] = std::move(frames);
-  write_file(file, document.dump(1) + "\n");
+  write_file(file, print_json(document, file.string()));
   return report;
 }
 

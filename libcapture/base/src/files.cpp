@@ -2,16 +2,18 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
 #include <openssl/evp.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
-#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <memory>
 #include <utility>
+
+#include "claim.h"
 
 namespace lumihull {
 
@@ -97,18 +99,79 @@ std::string read_file(const fs::path& file, std::size_t max_bytes) {
   return bytes;
 }
 
+namespace internal {
+
+namespace {
+
+constexpr int kMostClaims = 1000;  ///< far more than anybody writes of one name at a time
+
+int create(const fs::path& path, ClaimKind kind) {
+  if (kind == ClaimKind::file) return ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (::mkdir(path.c_str(), 0777) != 0) return -1;
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) {
+    const int error = errno;
+    ::rmdir(path.c_str());
+    errno = error;
+  }
+  return descriptor;
+}
+
+/// Whether a path still leads to what was opened there.
+bool is_at(int descriptor, const fs::path& path) {
+  struct stat ours {
+  }, there{};
+  return ::fstat(descriptor, &ours) == 0 && ::lstat(path.c_str(), &there) == 0 && ours.st_ino == there.st_ino &&
+         ours.st_dev == there.st_dev;
+}
+
+/// Removes what nobody holds; false where somebody does, or where that can't be told.
+bool remove_leftover(const fs::path& path, ClaimKind kind) {
+  const int folder = kind == ClaimKind::folder ? O_DIRECTORY : 0;
+  const Descriptor found(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC | folder));
+  if (found.value < 0) return errno == ENOENT;
+  if (::flock(found.value, LOCK_EX | LOCK_NB) != 0) return false;
+  if (!is_at(found.value, path)) return true;  // its holder has just put it in place
+  if (kind == ClaimKind::file) return ::unlink(path.c_str()) == 0;
+  std::error_code error;
+  fs::remove_all(path, error);
+  return !error;
+}
+
+}  // namespace
+
+Claim claim(const fs::path& prefix, ClaimKind kind, const fs::path& subject) {
+  for (int number = 0; number < kMostClaims;) {
+    fs::path path = prefix;
+    path += std::to_string(number);
+    const int descriptor = create(path, kind);
+    if (descriptor < 0) {
+      if (errno != EEXIST) fail(errno, "can't write here", subject);
+      if (!remove_leftover(path, kind)) ++number;
+      continue;
+    }
+    // Between the two calls another process may have taken it for a leftover: then again.
+    const bool locked = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+    if (locked && is_at(descriptor, path)) return {path, descriptor};
+    ::close(descriptor);
+  }
+  fail(EEXIST, "can't write here, too many unfinished files of this name", subject);
+}
+
+}  // namespace internal
+
 AtomicFile::AtomicFile(fs::path file) : file_(std::move(file)) {
-  static std::atomic<unsigned> counter{0};  // two threads may write files of one name: the last rename wins, whole
-  temporary_ = file_;
-  temporary_ += ".part-" + std::to_string(::getpid()) + "-" + std::to_string(counter.fetch_add(1));
-  descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (descriptor_ < 0) fail(errno, "can't write here", file_);
+  fs::path prefix = file_;
+  prefix += ".part-";
+  internal::Claim claim = internal::claim(prefix, internal::ClaimKind::file, file_);
+  temporary_ = std::move(claim.path);
+  descriptor_ = claim.descriptor;
 }
 
 AtomicFile::~AtomicFile() {
   if (descriptor_ < 0) return;
-  ::close(descriptor_);
   ::unlink(temporary_.c_str());
+  ::close(descriptor_);
 }
 
 void AtomicFile::write(std::string_view bytes) {
@@ -124,16 +187,9 @@ void AtomicFile::write(std::string_view bytes) {
 
 void AtomicFile::commit() {
   if (::fsync(descriptor_) != 0) fail(errno, "can't write", file_);
-  if (::close(std::exchange(descriptor_, -1)) != 0) {
-    const int error = errno;
-    ::unlink(temporary_.c_str());
-    fail(error, "can't write", file_);
-  }
-  if (::rename(temporary_.c_str(), file_.c_str()) != 0) {
-    const int error = errno;
-    ::unlink(temporary_.c_str());
-    fail(error, "can't replace", file_);
-  }
+  // Renamed while it is held, so that nobody takes it for a leftover; what can fail in closing, fsync has told already.
+  if (::rename(temporary_.c_str(), file_.c_str()) != 0) fail(errno, "can't replace", file_);
+  ::close(std::exchange(descriptor_, -1));
   const fs::path folder = file_.has_parent_path() ? file_.parent_path() : fs::path(".");
   const Descriptor parent(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (parent.value >= 0) ::fsync(parent.value);  // some file systems can't; the rename itself is atomic anyway

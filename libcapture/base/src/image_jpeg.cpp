@@ -33,11 +33,26 @@ struct Failure {
   std::longjmp(failure->jump, 1);
 }
 
+/// Whether the stray bytes of which libjpeg warns are those that some cameras leave between the last row and the end
+/// marker: padding (00 and FF), or one or two bytes of any kind. A scan that was damaged ends early as often as late,
+/// but what is left of it is more, and is not padding (README.md has the figures).
+bool harmless_stray_bytes(j_common_ptr info) {
+  const jpeg_source_mgr& source = *reinterpret_cast<j_decompress_ptr>(info)->src;
+  const int count = info->err->msg_parm.i[0], marker = info->err->msg_parm.i[1];
+  if (marker != JPEG_EOI) return false;
+  // They stand right before what is read next.
+  for (int i = 1; count > 2 && i <= count; ++i)
+    if (source.next_input_byte[-i] != 0x00 && source.next_input_byte[-i] != 0xff) return false;
+  return true;
+}
+
 /// Warnings about the data are failures: libjpeg would go on and leave the rest of the picture grey.
 void on_message(j_common_ptr info, int level) {
   if (level >= 0) return;
   const int code = info->err->msg_code;
-  if (code != JWRN_JFIF_MAJOR && code != JWRN_ADOBE_XFORM && code != JWRN_BOGUS_ICC) leave(info);
+  if (code == JWRN_JFIF_MAJOR || code == JWRN_ADOBE_XFORM || code == JWRN_BOGUS_ICC) return;
+  if (code == JWRN_EXTRANEOUS_DATA && harmless_stray_bytes(info)) return;
+  leave(info);
 }
 
 void install(Failure& failure, j_common_ptr info) {

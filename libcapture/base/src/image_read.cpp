@@ -16,7 +16,8 @@ namespace lumihull {
 namespace internal {
 
 FileSource::FileSource(const std::filesystem::path& file)
-    : name_(file.string()), descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC)) {
+    : name_(file.string()),
+      descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {  // a pipe must not block
   if (descriptor_ < 0) {
     if (errno == ENOENT || errno == ENOTDIR) throw Error(ErrorCode::not_found, "no such file", name_);
     throw Error(ErrorCode::io, std::string("can't be read: ") + std::generic_category().message(errno), name_);

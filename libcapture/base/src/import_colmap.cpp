@@ -2,7 +2,6 @@
 
 #include <lumihull/base/files.h>
 
-#include <cstdio>
 #include <map>
 
 #include "colmap_model.h"

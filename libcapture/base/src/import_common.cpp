@@ -8,11 +8,14 @@
 
 #include <Eigen/SVD>
 #include <algorithm>
-#include <cctype>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <set>
 #include <system_error>
+
+#include "claim.h"
+#include "text.h"
 
 namespace lumihull::internal {
 
@@ -59,6 +62,12 @@ std::vector<ImageInfo> read_infos(const std::vector<fs::path>& files, Job& job) 
   std::vector<ImageInfo> infos(files.size());
   parallel_for(job, files.size(), [&](std::size_t i) { infos[i] = read_image_info(files[i]); });
   return infos;
+}
+
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw Error(ErrorCode::io, "can't make the folder: " + error.message(), folder.string());
 }
 
 void check_output(const fs::path& output) {
@@ -123,41 +132,45 @@ class Aside {
  public:
   explicit Aside(const fs::path& output) : output_(fs::absolute(output).lexically_normal()) {
     if (!output_.has_filename()) output_ = output_.parent_path();
-    folder_ = output_.parent_path() / ("." + output_.filename().string() + ".importing-" + std::to_string(::getpid()));
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);  // of a killed import that had the same process number
+    const fs::path beside = output_.parent_path();
+    make_folder(beside);
+    claim_ = claim(beside / ("." + output_.filename().string() + ".importing-"), ClaimKind::folder, output_);
   }
   Aside(const Aside&) = delete;
   Aside& operator=(const Aside&) = delete;
   ~Aside() {
     std::error_code ignored;
-    if (!folder_.empty()) fs::remove_all(folder_, ignored);
+    if (!in_place_) fs::remove_all(claim_.path, ignored);
+    ::close(claim_.descriptor);
   }
-  const fs::path& folder() const { return folder_; }
+  const fs::path& folder() const { return claim_.path; }
 
   void put_in_place() {
-    if (const int descriptor = ::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); descriptor >= 0) {
-      const bool synced = ::syncfs(descriptor) == 0;
-      const int reason = errno;
-      ::close(descriptor);
-      if (!synced) throw Error(ErrorCode::io, std::generic_category().message(reason), folder_.string());
-    }
+    if (::syncfs(claim_.descriptor) != 0)
+      throw Error(ErrorCode::io, std::generic_category().message(errno), claim_.path.string());
     std::error_code error;
-    fs::rename(folder_, output_, error);  // also over an empty folder
+    fs::rename(claim_.path, output_, error);  // also over an empty folder
     if (error) throw Error(ErrorCode::io, "can't put the new capture in place: " + error.message(), output_.string());
-    folder_.clear();
+    in_place_ = true;
   }
 
  private:
-  fs::path output_, folder_;
+  fs::path output_;
+  Claim claim_;
+  bool in_place_ = false;
 };
 
-std::string clean_name(std::string name) {
-  for (char& c : name)
-    if (static_cast<unsigned char>(c) < 0x20 || c == '/' || c == '\\' || c == 0x7f) c = '_';
-  if (name.size() > 120) name.resize(120);
-  if (name.empty() || name == "." || name == "..") name = "photo";
-  return name;
+/// A part of a file's name: printable UTF-8 without slashes, and short.
+std::string clean_part(const std::string& text, std::size_t most) {
+  std::string part = printable(text, '_', most);
+  std::replace_if(
+      part.begin(), part.end(), [](char c) { return c == '/' || c == '\\'; }, '_');
+  return part;
+}
+
+std::string clean_name(const std::string& text) {
+  const std::string name = clean_part(text, 120);
+  return name.empty() || name == "." || name == ".." ? "photo" : name;
 }
 
 /// The alpha channel as a mask; an empty picture where it is opaque everywhere.
@@ -178,12 +191,27 @@ Image mask_from_alpha(const Image& photo) {
 std::string unique_name(const fs::path& file, std::set<std::string>& taken) {
   const std::string stem = clean_name(file.stem().string());
   const std::string folder = clean_name(file.parent_path().filename().string());
-  std::string extension = file.extension().string();
+  std::string extension = clean_part(file.extension().string(), 40);
   if (!extension.empty()) extension[0] = '_';
   for (const std::string& name : {stem, clean_name(folder + "_" + stem), clean_name(stem + extension)})
     if (taken.insert(name).second) return name;
   for (int i = 2;; ++i)
     if (const std::string name = stem + "_" + std::to_string(i); taken.insert(name).second) return name;
+}
+
+std::string copy_name(const std::string& name, const fs::path& file) {
+  return name + clean_part(file.extension().string(), 40);
+}
+
+std::string reference_to(const fs::path& file) {
+  std::error_code error;
+  const std::string path = fs::canonical(file, error).string();
+  if (error) throw Error(ErrorCode::io, "can't find out its path: " + error.message(), file.string());
+  if (printable(path, '?') != path)
+    throw Error(ErrorCode::unsupported,
+                "a path that is not UTF-8, or holds control characters, can't be referred to: copy the photograph",
+                file.string());
+  return path;
 }
 
 Capture build_capture(Imported imported, const std::vector<ImageInfo>& infos, const ImportOptions& options, Job& job) {
@@ -208,15 +236,14 @@ Capture build_capture(Imported imported, const std::vector<ImageInfo>& infos, co
     const ImportedPhoto& photo = imported.photos[i];
     Shot shot;
     shot.name = unique_name(photo.file, taken);
-    shot.file = options.reference ? fs::canonical(photo.file).string()
-                                  : "photos/" + shot.name + clean_name(photo.file.extension().string());
+    shot.file = options.reference ? reference_to(photo.file) : "photos/" + copy_name(shot.name, photo.file);
     shot.camera = photo.camera;
     shot.orientation = infos[i].orientation;
     shot.cam_from_world = photo.cam_from_world;
     shot.time = infos[i].time;
     capture.shots.push_back(std::move(shot));
   }
-  if (!options.reference) fs::create_directory(aside.folder() / "photos");
+  if (!options.reference) make_folder(aside.folder() / "photos");
   std::vector<char> masked(capture.shots.size(), 0);
   job.begin("importing photographs", capture.shots.size());
   parallel_for(

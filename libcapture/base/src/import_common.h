@@ -45,8 +45,16 @@ std::vector<ImageInfo> read_infos(const std::vector<std::filesystem::path>& file
 /// Throws invalid_argument where `output` is in use. Called first, so that no work is lost.
 void check_output(const std::filesystem::path& output);
 
-/// A photograph's stem, or its folder's name, extension or a number added until no other of `taken` has it.
+/// Makes a folder and those above it; nothing where it is there. Errors: io.
+void make_folder(const std::filesystem::path& folder);
+
+/// A photograph's stem, or its folder's name, extension or a number added until no other of `taken` has it. What is no
+/// printable UTF-8 becomes '_'.
 std::string unique_name(const std::filesystem::path& file, std::set<std::string>& taken);
+/// What the copy of a photograph that is called `name` is called: the name and the file's extension.
+std::string copy_name(const std::string& name, const std::filesystem::path& file);
+/// The path by which a capture refers to a photograph where it is. Errors: io, unsupported (not UTF-8).
+std::string reference_to(const std::filesystem::path& file);
 
 /// Writes the capture: `infos` belong to imported.photos.
 Capture build_capture(Imported imported, const std::vector<ImageInfo>& infos, const ImportOptions& options, Job& job);

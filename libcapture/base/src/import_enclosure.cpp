@@ -16,28 +16,25 @@ int import_enclosure(Capture& capture, std::span<const fs::path> files, bool ref
   std::set<std::string> taken;
   for (const Shot& shot : capture.enclosure) taken.insert(shot.name);
 
-  const fs::path folder = capture.folder() / "enclosure";
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw Error(ErrorCode::io, "can't make the folder: " + error.message(), folder.string());
+  if (!reference) internal::make_folder(capture.folder() / "enclosure");
+  std::vector<Shot> added;
   job.begin("importing the empty enclosure", files.size());
   for (const fs::path& file : files) {
     job.check();
     Shot shot;
     shot.name = internal::unique_name(file, taken);
     if (reference) {
-      shot.file = fs::absolute(file).lexically_normal().string();
+      shot.file = internal::reference_to(file);
     } else {
-      shot.file = "enclosure/" + shot.name + file.extension().string();
-      AtomicFile copy(capture.folder() / shot.file);
-      copy.write(read_file(file));
-      copy.commit();
+      shot.file = "enclosure/" + internal::copy_name(shot.name, file);
+      write_file(capture.folder() / shot.file, read_file(file));
     }
     shot.stamp = Capture::stamp(capture.photo_path(shot));
-    capture.enclosure.push_back(std::move(shot));
+    added.push_back(std::move(shot));
     job.advance();
   }
   job.end();
+  capture.enclosure.insert(capture.enclosure.end(), added.begin(), added.end());
   capture.save();
   return int(files.size());
 }

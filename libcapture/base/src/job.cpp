@@ -8,11 +8,12 @@ namespace lumihull {
 
 namespace {
 constexpr std::chrono::milliseconds kReportInterval{100};
-}
+constexpr unsigned kMostThreads = 1024;
+}  // namespace
 
 Job::Job(Callback callback, unsigned threads)
     : callback_(std::move(callback)),
-      threads_(threads ? threads : std::max(1u, std::thread::hardware_concurrency())),
+      threads_(std::min(threads ? threads : std::max(1u, std::thread::hardware_concurrency()), kMostThreads)),
       owner_(std::this_thread::get_id()) {}
 
 void Job::check() const {

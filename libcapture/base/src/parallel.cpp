@@ -5,6 +5,7 @@
 #include <cassert>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -39,7 +40,10 @@ void parallel_chunks(Job& job, std::size_t n, std::size_t chunk,
   {
     std::vector<std::jthread> helpers;  // joined at the end of this block
     const std::size_t threads = std::min<std::size_t>(job.threads(), chunks);
-    for (std::size_t t = 1; t < threads; ++t) helpers.emplace_back(work);
+    try {
+      for (std::size_t t = 1; t < threads; ++t) helpers.emplace_back(work);
+    } catch (const std::system_error&) {  // no more threads are to be had: those that run do it all
+    }
     work();
   }
   if (failure) std::rethrow_exception(failure);

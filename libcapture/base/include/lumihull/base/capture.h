@@ -64,9 +64,11 @@ class LUMIHULL_API Capture {
  public:
   /// A new capture in a folder that does not exist yet or is empty. Errors: invalid_argument (folder in use), io.
   static Capture create(const std::filesystem::path& folder);
-  /// Errors: not_found (no capture.json), bad_input.
+  /// Errors: not_found (no capture.json or cameras.json), bad_input.
   static Capture open(const std::filesystem::path& folder);
 
+  /// Errors: io; bad_input for what `open` would refuse (a number that is not finite, a text that is not UTF-8, a name
+  /// used twice): the files are then left as they were.
   void save() const;
 
   const std::filesystem::path& folder() const noexcept { return folder_; }
@@ -84,6 +86,10 @@ class LUMIHULL_API Capture {
   int hold_out() const;
   void set_hold_out(int n);
   bool held_out(std::size_t shot) const { return hold_out() > 0 && shot % std::size_t(hold_out()) == 0; }
+
+  /// Adds a photograph without a pose and returns its index. file: relative to the folder, or absolute; not copied.
+  /// Errors: invalid_argument (a name that is in use or no plain file name, no such camera), not_found.
+  std::size_t add_shot(const std::string& name, const std::string& file, std::size_t camera);
 
   std::filesystem::path photo_path(const Shot& shot) const;
   std::filesystem::path mask_path(const Shot& shot) const { return folder_ / "masks" / (shot.name + ".png"); }

@@ -24,7 +24,8 @@ enum class ErrorCode : std::int32_t {
 /// The one exception type of Lumihull.
 ///
 /// `message()` is one line, objective, and says what was expected or what to do; `subject()` names the thing it is
-/// about (a file, a photograph, a JSON pointer), and may be empty. `what()` is "subject: message".
+/// about (a file, a photograph, a JSON pointer), and may be empty. `what()` is "subject: message". All three are UTF-8
+/// without control characters: each byte of what a file or a name brought along besides is a '?'.
 class LUMIHULL_API Error : public std::runtime_error {
  public:
   Error(ErrorCode code, std::string message, std::string subject = {});

@@ -15,7 +15,8 @@ namespace lumihull {
 LUMIHULL_API std::string read_file(const std::filesystem::path& file, std::size_t max_bytes = std::size_t(1) << 30);
 
 /// Replaces a file atomically: written beside it under a temporary name, fsync, rename, fsync of the folder. A kill
-/// at any moment leaves the old file or the new one. Errors: io (with the operating system's reason).
+/// at any moment leaves the old file or the new one, and at most a NAME.part-N beside it, which the next write of that
+/// file removes. Errors: not_found (no such folder), io (with the operating system's reason).
 LUMIHULL_API void write_file(const std::filesystem::path& file, std::string_view bytes);
 
 /// The same for content that is produced piece by piece. Without `commit` nothing is left behind.

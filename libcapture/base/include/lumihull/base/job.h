@@ -29,7 +29,7 @@ class LUMIHULL_API Job {
  public:
   using Callback = std::function<void(const Progress&)>;
 
-  /// threads: 0 = one for each core of the machine.
+  /// threads: 0 = one for each core of the machine; more than 1024 count as 1024.
   explicit Job(Callback callback = {}, unsigned threads = 0);
   Job(const Job&) = delete;
   Job& operator=(const Job&) = delete;

@@ -6,12 +6,12 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
 
-#include <nlohmann/json.hpp>
-
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 
@@ -29,8 +29,8 @@ class JsonReader {
   const std::string& file() const { return file_; }
 
   [[noreturn]] void fail(const std::string& expected) const {
-    throw Error(ErrorCode::bad_input, "at " + (pointer_.empty() ? std::string("/") : pointer_) + ": expected " + expected,
-                file_);
+    throw Error(ErrorCode::bad_input,
+                "at " + (pointer_.empty() ? std::string("/") : pointer_) + ": expected " + expected, file_);
   }
 
   bool has(std::string_view key) const { return value_->is_object() && value_->contains(key); }
@@ -57,7 +57,13 @@ class JsonReader {
     if (!value_->is_number()) fail("a number");
     const double x = value_->get<double>();
     if (!std::isfinite(x) || x < low || x > high)
-      fail("a number from " + std::to_string(low) + " to " + std::to_string(high));
+      fail(high < std::numeric_limits<double>::max() ? "a number from " + short_text(low) + " to " + short_text(high)
+                                                     : "a number of at least " + short_text(low));
+    return x;
+  }
+  double positive() const {
+    const double x = number();
+    if (!(x > 0)) fail("a positive number");
     return x;
   }
   std::int64_t integer(std::int64_t low, std::int64_t high) const {
@@ -81,6 +87,12 @@ class JsonReader {
   }
 
  private:
+  static std::string short_text(double x) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%g", x);
+    return text;
+  }
+
   const Json* value_;
   std::string file_, pointer_;
 };
@@ -90,7 +102,17 @@ inline Json parse_json(std::string_view text, const std::string& file) {
   try {
     return Json::parse(text);
   } catch (const nlohmann::json::exception& e) {
-    throw Error(ErrorCode::bad_input, std::string("not valid JSON: ") + e.what(), file);
+    // It quotes the token that it stumbled over, which may be as long as the file.
+    throw Error(ErrorCode::bad_input, "not valid JSON: " + std::string(e.what()).substr(0, 300), file);
+  }
+}
+
+/// JSON as text. Error{bad_input} naming `file`, which it is for, where a string is not UTF-8.
+inline std::string print_json(const Json& json, const std::string& file) {
+  try {
+    return json.dump(1) + "\n";
+  } catch (const nlohmann::json::exception&) {
+    throw Error(ErrorCode::bad_input, "a name or another text is not UTF-8 and can't be stored as JSON", file);
   }
 }
 
