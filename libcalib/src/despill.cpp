@@ -43,7 +43,7 @@ Despill::Despill(std::span<const ColorCount> background) {
   for (const auto& [cosine, count] : cosines) {
     left -= count;
     if (left > 0) continue;
-    angle = std::clamp(std::acos(std::min(cosine, 1.0f)), 0.1f, 0.7f);
+    angle = std::clamp(std::acos(std::clamp(cosine, -1.0f, 1.0f)), 0.1f, 0.7f);
     break;
   }
   cos_inner_ = std::cos(angle);

@@ -63,6 +63,16 @@ TEST(Despill, HoldsForEnclosuresOfAnyHue) {
   }
 }
 
+TEST(Despill, AnEnclosureOfTwoOppositeHuesStaysFinite) {
+  for (int v = 100; v < 250; ++v) {
+    const auto g = std::uint8_t(v), m = std::uint8_t(350 - v);
+    const std::vector<ColorCount> both{{{0, g, 0}, 90}, {{m, 0, m}, 10}};
+    const Despill despill(both);
+    ASSERT_FALSE(despill.neutral());
+    EXPECT_TRUE(despill({90, 120, 60}, SpillMode::desaturate).allFinite()) << v;
+  }
+}
+
 TEST(Despill, AGreyEnclosureBleedsNoHue) {
   Image photo(4, 4, 3);
   for (std::size_t i = 0; i < photo.bytes(); ++i) photo.data()[i] = std::byte(i * 5);

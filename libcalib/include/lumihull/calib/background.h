@@ -52,8 +52,8 @@ struct Region {
 /// wrong.
 LUMIHULL_API std::vector<Region> parse_regions(const std::string& text);
 
-/// Where a scan's black frame is: rows and columns at the picture's border that are nearly black (or one constant
-/// colour) over their whole length. Pixels [x0, x1) x [y0, y1) are picture.
+/// What is left of a scan within its black frame: rows and columns at the picture's border that are nearly black over
+/// their whole length and end in a step do not belong to it. Pixels [x0, x1) x [y0, y1) are picture.
 struct Frame {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
