@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #ifdef __AVX2__
 #include <immintrin.h>
@@ -24,8 +25,11 @@ BlockView::BlockView(const ProjectedView& v, double voxel) : view(&v), scale(flo
   // 8 · 2^-24 of u, which is at most the field's width. The field changes by at most one cell a cell along each axis.
   const double cells = std::max(v.field->cells_x(), v.field->cells_y());
   error = (2 * 5e-7 * cells + 2e-5) * v.field->cell;
-  span_z = 0;
-  for (int axis = 0; axis < 3; ++axis) span_z += std::max(0.0, 3 * v.m(2, axis) * voxel);
+  beyond = before = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    beyond += std::max(0.0, 3 * v.m(2, axis) * voxel);
+    before += std::max(0.0, -3 * v.m(2, axis) * voxel);
+  }
 }
 
 std::uint8_t bound(const ProjectedView& view, const Eigen::Vector3d& center, const Eigen::Vector3d& half) {
@@ -59,10 +63,9 @@ std::uint8_t bound(const ProjectedView& view, const Eigen::Vector3d& center, con
     }
   const float z0 = *std::min_element(corner[2], corner[2] + 8), z1 = *std::max_element(corner[2], corner[2] + 8);
 #endif
-  // Rounding of z, generously; a box that comes closer to the camera's plane than that is not bounded.
-  const float tiny = 1e-5f * (std::abs(z0) + std::abs(z1));
-  if (z1 < -tiny) return kNotSeen;
-  if (!(z0 > tiny)) return 0;
+  if (z1 < -1e-5f * std::abs(z0)) return kNotSeen;  // rounding of z, generously
+  // Rounding of u and v grows with the ratio of the depths; a box so near to the camera is not bounded.
+  if (!(z0 > 0.25f * z1)) return 0;
 #ifdef __AVX2__
   const __m256 u = _mm256_div_ps(corners(0), z), v = _mm256_div_ps(corners(1), z);
   u0 = least(u), u1 = most(u), v0 = least(v), v1 = most(v);
@@ -146,7 +149,9 @@ double merge(const BlockView& block_view, const Eigen::Vector3d& first, Top& top
       }
     }
 #endif
-  return block_view.error * (base[2] + block_view.span_z);
+  // U and Z are rounded as the leaf's farthest sample has them, and divided by the nearest one's Z.
+  const double far = base[2] + block_view.beyond, near = base[2] - block_view.before;
+  return near > 0 ? block_view.error * far * (far / near) : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace lumihull::hull

@@ -17,8 +17,9 @@ struct BlockView {
   // Per lane (x = lane % 4, y = lane / 4) and per row of lanes (two in y, four in z): steps of U, V, Z.
   alignas(32) std::array<float, 8> lane_u, lane_v, lane_z, row_u, row_v, row_z;
   float scale;    // quantum: φ = scale * sample * Z
-  double error;   // |φ in single precision - φ| <= error * Z
-  double span_z;  // largest Z within a leaf exceeds its first sample's by at most this
+  double error;   // |φ in single precision - φ| <= error * Z, where a leaf's depths are all about Z
+  double beyond;  // a leaf's largest Z exceeds its first sample's by at most this …
+  double before;  // … and its smallest is less by at most this
 };
 
 /// Bits (CellState) of what a view sees of the box center ± half, at least; 0: that can't be bounded, for part of the
