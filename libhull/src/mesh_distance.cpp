@@ -1,12 +1,11 @@
-#include <embree3/rtcore.h>
-#include <lumihull/base/error.h>
 #include <lumihull/base/parallel.h>
 #include <lumihull/hull/simplify.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
-#include <memory>
+
+#include "embree_scene.h"
 
 namespace lumihull::hull {
 namespace {
@@ -47,25 +46,8 @@ bool visit(RTCPointQueryFunctionArguments* args) {
 
 MeshDistance distance(const Mesh& from, const Mesh& to, Job& job) {
   validate(from, "mesh");
-  validate(to, "mesh");
   if (from.empty() || to.empty()) throw Error(ErrorCode::invalid_argument, "an empty mesh has no distance");
-  const std::unique_ptr<RTCDeviceTy, void (*)(RTCDevice)> device(rtcNewDevice(nullptr), rtcReleaseDevice);
-  if (!device) throw Error(ErrorCode::internal, "Embree does not start on this machine");
-  const std::unique_ptr<RTCSceneTy, void (*)(RTCScene)> scene(rtcNewScene(device.get()), rtcReleaseScene);
-  rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
-  const std::unique_ptr<RTCGeometryTy, void (*)(RTCGeometry)> geometry(
-      rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE), rtcReleaseGeometry);
-  void* vertices = rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                           sizeof(Eigen::Vector3f), to.vertices.size());
-  void* indices = rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                          3 * sizeof(std::uint32_t), to.triangles.size());
-  if (!vertices || !indices) throw Error(ErrorCode::out_of_memory, "no memory for the mesh's tree");
-  std::copy_n(to.vertices[0].data(), 3 * to.vertices.size(), static_cast<float*>(vertices));
-  std::copy_n(to.triangles[0].data(), 3 * to.triangles.size(), static_cast<std::uint32_t*>(indices));
-  rtcCommitGeometry(geometry.get());
-  rtcAttachGeometry(scene.get(), geometry.get());
-  rtcCommitScene(scene.get());
-
+  const EmbreeScene scene(to);
   const std::size_t n = from.vertices.size() + from.triangles.size(), chunk = 4096;
   std::vector<MeshDistance> parts((n + chunk - 1) / chunk);
   parallel_chunks(job, n, chunk, [&](std::size_t first, std::size_t last) {
