@@ -16,7 +16,9 @@ HullReport carve_capture(const Capture& capture, const HullStageOptions& options
   std::vector<std::size_t> shots;
   std::vector<View> views;
   CarveOptions carving;
+  std::size_t positioned = 0;
   for (std::size_t i = 0; i < capture.shots.size(); ++i) {
+    positioned += capture.positioned(i);
     if (!capture.positioned(i) || capture.held_out(i)) continue;
     const Shot& shot = capture.shots[i];
     if (!std::filesystem::exists(capture.mask_path(shot)))
@@ -26,11 +28,15 @@ HullReport carve_capture(const Capture& capture, const HullStageOptions& options
     views.push_back(capture.view(i));
     carving.names.push_back(shot.name);
   }
-  if (shots.size() < 2)
-    throw Error(
-        ErrorCode::degenerate,
-        "a hull needs at least 2 photographs with poses that are not held out, not " + std::to_string(shots.size()),
-        capture.folder().string());
+  if (shots.size() < 2) {
+    const std::string needs = "a hull needs at least 2 photographs with poses that are not held out; ";
+    throw Error(ErrorCode::degenerate,
+                needs + (positioned == 0 ? "none has a pose: import cameras with the photographs"
+                                         : std::to_string(positioned) + " of " + std::to_string(capture.shots.size()) +
+                                               " have poses, and " + std::to_string(positioned - shots.size()) +
+                                               " of these are held out"),
+                capture.folder().string());
+  }
   carving.resolution = options.resolution;
   carving.rule = options.rule;
   carving.min_component = options.min_component;

@@ -81,8 +81,10 @@ Occupancy occupancy(const HullFunction::Impl& function, const Box& box, int size
     splitter.split({int(i) % n * step, int(i) / n % n * step, int(i) / (n * n) * step, step, 0, 0}, all);
   });
   const std::uint32_t best = *std::max_element(seen.begin(), seen.end());
+  // What one view alone sees goes on without end.
+  const std::uint32_t least = best > 0 ? std::max((best - 1 + 3) / 4, std::min(best - 1, 2u)) : 0;
   cells.occupied.resize(seen.size());
-  for (std::size_t i = 0; i < seen.size(); ++i) cells.occupied[i] = seen[i] > 0 && 4 * (seen[i] - 1) >= best - 1;
+  for (std::size_t i = 0; i < seen.size(); ++i) cells.occupied[i] = seen[i] > 0 && seen[i] - 1 >= least;
   return cells;
 }
 

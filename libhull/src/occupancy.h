@@ -20,7 +20,7 @@ struct Occupancy {
 };
 
 /// size: a power of two. Cells that less than a quarter as many views see whole as the best seen occupied cell are not
-/// occupied: what only few pictures contain says little about where the object is.
+/// occupied, nor those that one view alone sees: what only few pictures contain says little about where the object is.
 Occupancy occupancy(const HullFunction::Impl& function, const Box& box, int size, Job& job);
 
 /// Takes out connected parts (26 neighbours) of less than `min_share` of the largest part's cells.

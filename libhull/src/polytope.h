@@ -3,8 +3,6 @@
 #include <lumihull/hull/field.h>
 
 #include <Eigen/Core>
-#include <optional>
-#include <span>
 #include <vector>
 
 namespace lumihull::hull {

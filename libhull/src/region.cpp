@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <tuple>
 
 #include "explain.h"
 #include "hull_function.h"
@@ -216,7 +215,8 @@ SilhouetteOptions silhouette_options(const View& view, const Box& region, int re
   SilhouetteOptions options;
   if (!(depth > 0)) return options;
   const double px = voxel * view.camera.f * std::max(1.0, view.camera.s);  // footprint at depth 1
-  options.cell_px = std::clamp(std::floor(0.25 * px / depth), 1.0, 64.0);
+  // Down to an eighth of an octave, for photographs of one cell share the lens's tables.
+  options.cell_px = std::clamp(std::exp2(std::floor(8 * std::log2(0.25 * px / depth)) / 8), 1.0, 64.0);
   options.band_px = std::clamp(1.75 * px / nearest, 2.0, 1e4);
   return options;
 }
@@ -234,27 +234,38 @@ std::vector<Silhouette> make_silhouettes(std::span<const View> views, const std:
   };
   std::optional<Box> region = region_in;
   if (!region && !views.empty()) {
-    const std::vector<std::size_t> chosen = spread(views, kCoarseViews);
-    std::vector<std::optional<Silhouette>> coarse(chosen.size());
-    parallel_for(job, chosen.size(), [&](std::size_t k) {
-      const std::size_t i = chosen[k];
-      coarse[k] = named(i, [&] {
-        const Camera& camera = views[i].camera;
-        const double cell = std::clamp(std::round(std::max(camera.width, camera.height) / 256.0), 1.0, 64.0);
-        return Silhouette::from_mask(load(i), camera, {cell, 2 * cell});
+    std::vector<std::optional<Silhouette>> coarse(views.size());
+    const auto look_at = [&](const std::vector<std::size_t>& chosen) {
+      parallel_for(job, chosen.size(), [&](std::size_t k) {
+        const std::size_t i = chosen[k];
+        coarse[i] = named(i, [&] {
+          const Camera& camera = views[i].camera;
+          const double cell = std::clamp(std::round(std::max(camera.width, camera.height) / 256.0), 1.0, 64.0);
+          return Silhouette::from_mask(load(i), camera, {cell, 2 * cell});
+        });
       });
-    });
+    };
+    const auto usable = [&](const auto& silhouette) { return silhouette && constrains(*silhouette); };
+    const std::vector<std::size_t> chosen = spread(views, kCoarseViews);
+    look_at(chosen);
+    // Where most masks are empty or full, those that are not must be looked for among all.
+    if (2 * std::size_t(std::count_if(coarse.begin(), coarse.end(), usable)) < chosen.size()) {
+      std::vector<std::size_t> others;
+      for (std::size_t i = 0; i < views.size(); ++i)
+        if (!coarse[i]) others.push_back(i);
+      look_at(others);
+    }
     std::vector<View> some_views;
     std::vector<Silhouette> some;
     std::vector<std::string> some_names;
-    for (std::size_t k = 0; k < chosen.size(); ++k) {
-      if (!constrains(*coarse[k])) continue;
-      some_views.push_back(views[chosen[k]]);
-      some.push_back(*coarse[k]);
-      some_names.push_back(name_of(names, chosen[k]));
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      if (!usable(coarse[i])) continue;
+      some_views.push_back(views[i]);
+      some.push_back(*coarse[i]);
+      some_names.push_back(name_of(names, i));
     }
     if (some.size() < 2)
-      throw Error(ErrorCode::degenerate, std::to_string(some.size()) + " of " + std::to_string(chosen.size()) +
+      throw Error(ErrorCode::degenerate, std::to_string(some.size()) + " of " + std::to_string(views.size()) +
                                              " masks have object and background; a hull needs at least 2");
     const CarveRule some_rule = scaled(rule, some.size(), views.size());
     region = find_region(some_views, some, some_rule, some_names, job);

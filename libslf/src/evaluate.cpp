@@ -7,6 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
+
+#include "stage.h"
 
 namespace lumihull::slf {
 namespace {
@@ -30,18 +33,17 @@ class KnownMean {
 };
 
 Image reference_mask(const fs::path& folder, const std::string& name, const Camera& camera) {
-  for (const char* extension : {".png", ".jpg", ".jpeg", ".tif", ".tiff"}) {
-    const fs::path file = folder / (name + extension);
-    if (!fs::exists(file)) continue;
-    Image mask = read_image(file, {.channels = 1});
-    if (mask.width() != camera.width || mask.height() != camera.height)
-      throw Error(ErrorCode::bad_input,
-                  "expected a mask of " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
-                      " pixels, not " + std::to_string(mask.width()) + " x " + std::to_string(mask.height()),
-                  file.string());
-    return mask.type() == PixelType::u8 ? std::move(mask) : converted(mask, PixelType::u8, 1);
-  }
-  throw Error(ErrorCode::not_found, "there is no reference mask named after the photograph", (folder / name).string());
+  const std::optional<fs::path> file = reference_mask_file(folder, name);
+  if (!file)
+    throw Error(ErrorCode::not_found, "there is no reference mask named after the photograph",
+                (folder / name).string());
+  Image mask = read_image(*file, {.channels = 1});
+  if (mask.width() != camera.width || mask.height() != camera.height)
+    throw Error(ErrorCode::bad_input,
+                "expected a mask of " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
+                    " pixels, not " + std::to_string(mask.width()) + " x " + std::to_string(mask.height()),
+                file->string());
+  return mask.type() == PixelType::u8 ? std::move(mask) : converted(mask, PixelType::u8, 1);
 }
 
 Image coverage_of(const Image& rgba) {
@@ -101,6 +103,12 @@ ViewEvaluation mean_of(const std::vector<ViewEvaluation>& views) {
 
 }  // namespace
 
+std::optional<fs::path> reference_mask_file(const fs::path& folder, const std::string& name) {
+  for (const char* extension : {".png", ".jpg", ".jpeg", ".tif", ".tiff"})
+    if (fs::path file = folder / (name + extension); file_exists(file)) return file;
+  return std::nullopt;
+}
+
 std::string Evaluation::to_json() const {
   Json out;
   out["photos_used"] = photos_used;
@@ -123,7 +131,7 @@ std::string Evaluation::to_json() const {
   return out.dump(1);
 }
 
-Evaluation evaluate_capture(Capture& capture, const EvaluateOptions& options, Job& job) {
+Evaluation evaluate_capture(const Capture& capture, const EvaluateOptions& options, Job& job) {
   const std::vector<std::size_t> used = training_shots(capture), held_out = held_out_shots(capture);
   if (held_out.empty())
     throw Error(ErrorCode::degenerate, "no positioned photograph is held out: set hold_out to every Nth photograph",

@@ -6,6 +6,8 @@
 #include <lumihull/base/job.h>
 #include <lumihull/slf/pipeline.h>
 
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -58,5 +60,11 @@ void add_masks(const Capture& capture, InputDigest& digest);    ///< bytes of al
 
 std::filesystem::path textured_path(const Capture& capture);
 std::filesystem::path evaluation_path(const Capture& capture);
+
+/// A mask to judge a photograph by: NAME.png, .jpg, .jpeg, .tif or .tiff; nullopt where there is none.
+std::optional<std::filesystem::path> reference_mask_file(const std::filesystem::path& folder, const std::string& name);
+
+/// Whether a result is there; what can't be looked at isn't.
+bool file_exists(const std::filesystem::path& file);
 
 }  // namespace lumihull::slf

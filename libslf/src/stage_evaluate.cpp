@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <system_error>
 
 #include "stage.h"
 
@@ -34,14 +33,12 @@ void inputs(const Capture& capture, InputDigest& digest) {
   if (references.empty()) return;
   for (const std::size_t i : held_out_shots(capture)) {
     const std::string& name = capture.shots[i].name;
-    digest.add_file("reference " + name, references / (name + ".png"));
+    const auto file = reference_mask_file(references, name);
+    digest.add_file("reference " + name, file.value_or(references / name));
   }
 }
 
-bool present(const Capture& capture) {
-  std::error_code error;
-  return std::filesystem::exists(evaluation_path(capture), error);
-}
+bool present(const Capture& capture) { return file_exists(evaluation_path(capture)); }
 
 std::vector<std::string> run(Capture& capture, Job& job) {
   EvaluateOptions options;

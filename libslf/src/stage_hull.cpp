@@ -1,10 +1,7 @@
 #include <lumihull/base/error.h>
 #include <lumihull/hull/carve_capture.h>
-#include <lumihull/slf/photos.h>
 
 #include <cstdio>
-#include <filesystem>
-#include <system_error>
 
 #include "stage.h"
 
@@ -49,15 +46,9 @@ void inputs(const Capture& capture, InputDigest& digest) {
   add_masks(capture, digest);
 }
 
-bool present(const Capture& capture) {
-  std::error_code error;
-  return std::filesystem::exists(capture.hull_path(), error);
-}
+bool present(const Capture& capture) { return file_exists(capture.hull_path()); }
 
 std::vector<std::string> run(Capture& capture, Job& job) {
-  if (training_shots(capture).empty())
-    throw Error(ErrorCode::bad_input, "no photograph has a pose: import cameras with the photographs",
-                capture.folder().string());
   const hull::HullReport report = hull::carve_capture(capture, options_of(capture), job);
   std::vector<std::string> said;
   char line[240];
@@ -82,7 +73,7 @@ std::vector<std::string> run(Capture& capture, Job& job) {
 const StageDefinition& hull_stage() {
   static const StageDefinition stage{
       "hull",
-      1,
+      2,
       {
           {"resolution", "cubic voxels along the longest side of the region", std::int64_t(kDefaults.resolution),
            hull::kMinResolution, hull::kMaxResolution},

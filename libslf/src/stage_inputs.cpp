@@ -23,8 +23,7 @@ void InputDigest::add(std::string_view field, std::string_view value) {
 }
 
 void InputDigest::add_file(std::string_view field, const std::filesystem::path& file) {
-  std::error_code error;
-  add(field, std::filesystem::exists(file, error) ? sha256_of_file(file) : "missing");
+  add(field, file_exists(file) ? sha256_of_file(file) : "missing");
 }
 
 std::string InputDigest::hex() const { return sha256(text_); }
@@ -54,6 +53,11 @@ void add_cameras(const Capture& capture, InputDigest& digest) {
 
 void add_masks(const Capture& capture, InputDigest& digest) {
   for (const Shot& shot : capture.shots) digest.add_file("mask " + shot.name, capture.mask_path(shot));
+}
+
+bool file_exists(const std::filesystem::path& file) {
+  std::error_code error;
+  return std::filesystem::exists(file, error);
 }
 
 std::filesystem::path textured_path(const Capture& capture) { return capture.folder() / "textured.glb"; }

@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <optional>
-#include <system_error>
 
 #include "stage.h"
 
@@ -39,8 +38,7 @@ ViewEvaluation read_view(const JsonReader& json) {
 /// What the stage `evaluate` found, if it ran: evaluate/evaluation.json.
 std::optional<Evaluation> read_evaluation(const Capture& capture) {
   const std::filesystem::path file = evaluation_path(capture);
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) return std::nullopt;
+  if (!file_exists(file)) return std::nullopt;
   const internal::Json document = internal::read_json(file);
   const JsonReader top(document, file.string());
   Evaluation evaluation;
@@ -69,10 +67,7 @@ void inputs(const Capture& capture, InputDigest& digest) {
 
 std::filesystem::path report_path(const Capture& capture) { return capture.folder() / "report.html"; }
 
-bool present(const Capture& capture) {
-  std::error_code error;
-  return std::filesystem::exists(report_path(capture), error);
-}
+bool present(const Capture& capture) { return file_exists(report_path(capture)); }
 
 std::vector<std::string> run(Capture& capture, Job& job) {
   const std::optional<Evaluation> evaluation = read_evaluation(capture);

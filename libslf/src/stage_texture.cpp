@@ -5,8 +5,6 @@
 #include <lumihull/slf/textured_mesh.h>
 
 #include <cstdio>
-#include <filesystem>
-#include <system_error>
 
 #include "stage.h"
 
@@ -23,10 +21,7 @@ void inputs(const Capture& capture, InputDigest& digest) {
   digest.add_file("hull", capture.hull_path());
 }
 
-bool present(const Capture& capture) {
-  std::error_code error;
-  return std::filesystem::exists(textured_path(capture), error);
-}
+bool present(const Capture& capture) { return file_exists(textured_path(capture)); }
 
 std::vector<std::string> run(Capture& capture, Job& job) {
   const hull::Mesh mesh = hull::read_mesh(capture.hull_path());
@@ -51,7 +46,7 @@ const StageDefinition& texture_stage() {
   static const TextureOptions defaults;
   static const StageDefinition stage{
       "texture",
-      1,
+      2,
       {
           {"max_side", "largest width and height of the texture, px", std::int64_t(defaults.max_side), 64, 16384},
           {"texel_px", "size of a texel in pixels of the photographs", defaults.texel_px, 0.1, 100},

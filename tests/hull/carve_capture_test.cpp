@@ -86,8 +86,17 @@ TEST_F(CarveCapture, ErrorsNameThePhotographAndLeaveTheOldHull) {
   for (std::size_t i = 0; i < capture.shots.size(); ++i)
     if (i != 4) capture.write_mask(i, Image(110, 100, 1), MaskSource::imported);
   EXPECT_EQ(test::expect_error([&] { carve_capture(capture, options, job); }).code(), ErrorCode::degenerate);
-  capture.shots.resize(2);
-  EXPECT_EQ(test::expect_error([&] { carve_capture(capture, options, job); }).code(), ErrorCode::degenerate);
+  capture.options["evaluate"]["hold_out"] = std::int64_t(1);
+  EXPECT_THAT(test::expect_error([&] { carve_capture(capture, options, job); }).message(),
+              testing::HasSubstr("13 of 14 have poses, and 13 of these are held out"));
+  capture.set_hold_out(0);
+  capture.shots.resize(1);
+  EXPECT_THAT(test::expect_error([&] { carve_capture(capture, options, job); }).message(),
+              testing::HasSubstr("1 of 1 have poses, and 0 of these are held out"));
+  capture.shots[0].cam_from_world.reset();
+  const Error lost = test::expect_error([&] { carve_capture(capture, options, job); });
+  EXPECT_EQ(lost.code(), ErrorCode::degenerate);
+  EXPECT_THAT(lost.message(), testing::HasSubstr("none has a pose: import cameras"));
   EXPECT_EQ(sha256_of_file(capture.hull_path()), before);
 }
 

@@ -321,6 +321,36 @@ TEST(Region, IsFoundForEveryKindOfCapture) {
   }
 }
 
+TEST(Region, IsFoundForFewPhotographs) {
+  // Each photograph's cone leaves the other pictures somewhere, and nothing carves it there.
+  const auto all = test::views_around(test::pinhole(60, 60, 75), 60, 4);
+  const auto object = test::sphere({0, 0, 0}, 0.8);
+  for (const auto& chosen : std::vector<std::vector<std::size_t>>{{7, 30}, {7, 27, 47}, {3, 20, 37, 54}}) {
+    SCOPED_TRACE(chosen.size());
+    std::vector<View> views;
+    for (const std::size_t i : chosen) views.push_back(all[i]);
+    Job job;
+    const Box box = find_region(views, test::silhouettes_of(object, views), {}, {}, job);
+    EXPECT_LT(box.min.maxCoeff(), -0.8);
+    EXPECT_GT(box.max.minCoeff(), 0.8);
+    EXPECT_LT(box.size().maxCoeff(), 6);
+  }
+}
+
+TEST(Region, IsFoundWhereMostMasksAreEmpty) {
+  const auto views = test::views_around(test::pinhole(60, 60, 75), 60, 4);
+  const auto object = test::sphere({0, 0, 0}, 0.8);
+  const auto load = [&](std::size_t i) { return i % 20 == 7 ? test::mask_of(object, views[i]) : Image(60, 60, 1); };
+  Job job;
+  const auto silhouettes = make_silhouettes(views, load, std::nullopt, 32, {}, {}, job);
+  std::size_t used = 0;
+  for (const Silhouette& s : silhouettes) used += !s.is_empty();
+  EXPECT_EQ(used, 3u);
+  const auto nothing = [](std::size_t) { return Image(60, 60, 1); };
+  EXPECT_THAT(test::expect_error([&] { make_silhouettes(views, nothing, std::nullopt, 32, {}, {}, job); }).message(),
+              testing::HasSubstr("0 of 60 masks"));
+}
+
 TEST(Region, ViewsAlongOneLineHaveNone) {
   std::vector<View> views(3, {test::pinhole(60, 60, 70), look_at({0, 0, -4}, {0, 0, 0}, {0, 1, 0})});
   const auto silhouettes = test::silhouettes_of(test::sphere({0, 0, 0}, 0.5), views);

@@ -3,8 +3,10 @@
 #include <lumihull/slf/evaluate.h>
 #include <lumihull/slf/glb.h>
 #include <lumihull/slf/photos.h>
+#include <lumihull/slf/pipeline.h>
 #include <lumihull/slf/report.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -51,8 +53,6 @@ Capture painted_sphere(const fs::path& folder) {
 TEST(Evaluate, JudgesWhatWasHeldOut) {
   const test::TemporaryFolder folder;
   Capture capture = painted_sphere(folder / "capture");
-  // The photographs that are held out must not be needed for anything but the judgement: had they been blended, the
-  // lumigraph would show the photograph itself.
   Job job;
   const slf::Evaluation e = slf::evaluate_capture(capture, {}, job);
   EXPECT_EQ(e.photos_used, 12u);
@@ -81,6 +81,63 @@ TEST(Evaluate, JudgesWhatWasHeldOut) {
   EXPECT_EQ(json["methods"]["lumigraph"]["psnr"], e.mean.methods.at("lumigraph").psnr);
   EXPECT_EQ(json["stages"]["hull"]["peak_bytes"], 123456);
   EXPECT_FALSE(json.contains("keyed_iou"));
+}
+
+TEST(Evaluate, HeldOutPhotographsAreUsedForTheJudgementAlone) {
+  const test::TemporaryFolder folder;
+  Job job;
+  std::string model[2], hull[2];
+  std::vector<Image> renderings[2];
+  for (const std::size_t spoiled : {0u, 1u}) {
+    const fs::path where = folder / (spoiled ? "spoiled" : "good");
+    Capture capture = painted_sphere(where);
+    if (spoiled)
+      for (const std::size_t i : slf::held_out_shots(capture)) {
+        Image red(96, 80, 3), corner(96, 80, 1);
+        for (int y = 0; y < 80; ++y)
+          for (int x = 0; x < 96; ++x) red.row<std::uint8_t>(y)[3 * x] = 255;
+        std::fill_n(corner.row<std::uint8_t>(0), 20, std::uint8_t(255));
+        write_png(capture.photo_path(capture.shots[i]), red);
+        capture.write_mask(i, corner, MaskSource::imported);
+      }
+    slf::set_option(capture, "hull", "resolution", std::int64_t(32));
+    slf::set_option(capture, "texture", "max_side", std::int64_t(256));
+    slf::set_option(capture, "evaluate", "rays", std::int64_t(1));
+    for (const char* stage : {"hull", "texture", "evaluate"}) slf::run_stage(capture, stage, job);
+    hull[spoiled] = read_file(where / "hull.ply");
+    model[spoiled] = read_file(where / "textured.glb");
+    for (const std::size_t i : slf::held_out_shots(capture))
+      for (const char* method : {"lumigraph", "mean_texture"})
+        renderings[spoiled].push_back(read_image(where / "evaluate" / (capture.shots[i].name + "." + method + ".png")));
+  }
+  EXPECT_TRUE(hull[0] == hull[1]);
+  EXPECT_TRUE(model[0] == model[1]);
+  ASSERT_EQ(renderings[0].size(), 8u);
+  for (std::size_t i = 0; i < 8; ++i)
+    for (int y = 0; y < 80; ++y) {  // reference | rendering | difference
+      const std::uint8_t *a = renderings[0][i].row<std::uint8_t>(y), *b = renderings[1][i].row<std::uint8_t>(y);
+      ASSERT_TRUE(std::equal(a + 3 * 96, a + 6 * 96, b + 3 * 96)) << i << ", row " << y;
+      if (y == 40) {
+        EXPECT_FALSE(std::equal(a, a + 3 * 96, b));
+      }
+    }
+}
+
+TEST(Evaluate, IsDoneAgainWhereAReferenceMaskChanged) {
+  const test::TemporaryFolder folder;
+  Capture capture = painted_sphere(folder / "capture");
+  fs::create_directories(folder / "masks");
+  const auto write = [&](std::size_t i, const Image& mask) {
+    write_file(folder / "masks" / (capture.shots[i].name + ".jpg"), encode_jpeg(mask));
+  };
+  for (const std::size_t i : slf::held_out_shots(capture)) write(i, capture.read_mask(i));
+  slf::set_option(capture, "evaluate", "reference_masks", (folder / "masks").string());
+  slf::set_option(capture, "evaluate", "rays", std::int64_t(1));
+  Job job;
+  EXPECT_FALSE(slf::run_stage(capture, "evaluate", job).skipped);
+  EXPECT_TRUE(slf::run_stage(capture, "evaluate", job).skipped);
+  write(8, Image(96, 80, 1));
+  EXPECT_FALSE(slf::run_stage(capture, "evaluate", job).skipped);
 }
 
 TEST(Evaluate, ReferenceMasksWinAndAreCompared) {

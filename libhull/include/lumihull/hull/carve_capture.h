@@ -16,7 +16,7 @@ namespace lumihull::hull {
 struct HullStageOptions {
   int resolution = 256;           ///< cubic voxels along the longest side of the region, 8 … 2048
   std::optional<Box> region;      ///< nullopt: found from cameras and silhouettes
-  CarveRule rule;                 ///< tolerance, cuts
+  CarveRule rule{1, 2, {}, {}};   ///< min_views 2: what one photograph alone sees goes on without end
   double min_component = 0.01;    ///< see CarveOptions
   std::size_t max_triangles = 0;  ///< simplified to at most so many; 0: as carved
 };

@@ -29,7 +29,8 @@ LUMIHULL_API Box find_region(std::span<const View> views, std::span<const Silhou
 LUMIHULL_API SilhouetteOptions silhouette_options(const View& view, const Box& region, int resolution);
 
 /// Silhouettes of many masks, streamed: `load(i)` returns the i-th mask and is called from several threads; few masks
-/// are in memory at a time. Without a region about 24 masks are looked at coarsely first to know the voxels' size.
+/// are in memory at a time. Without a region 24 masks (all of them, where most of these are empty or full) are looked at
+/// coarsely first to know the voxels' size.
 /// An error about a mask gets names[i] as its subject.
 LUMIHULL_API std::vector<Silhouette> make_silhouettes(std::span<const View> views,
                                                       const std::function<Image(std::size_t)>& load,

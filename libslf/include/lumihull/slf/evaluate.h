@@ -55,6 +55,6 @@ struct Evaluation {
 /// model's file, JPEG losses included; the lumigraph blends the photographs that are not held out, on the same mesh.
 /// Writes evaluate/NAME.METHOD.png with `pictures`. Errors: degenerate (nothing held out), not_found (the model, a
 /// mask), bad_input.
-LUMIHULL_API Evaluation evaluate_capture(Capture& capture, const EvaluateOptions& options, Job& job);
+LUMIHULL_API Evaluation evaluate_capture(const Capture& capture, const EvaluateOptions& options, Job& job);
 
 }  // namespace lumihull::slf
