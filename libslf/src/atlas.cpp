@@ -106,11 +106,15 @@ class Charter {
     }
   }
 
-  std::vector<Chart> run() {
+  /// All charts; fewer, where their texels are more than `most` already.
+  std::vector<Chart> run(std::size_t most) {
     std::vector<Chart> charts;
-    for (std::uint32_t seed = 0; seed < mesh_.triangles.size(); ++seed)
-      if (chart_of_[seed] == kNone && !normals_[seed].isZero())
+    std::size_t texels = 0;
+    for (std::uint32_t seed = 0; seed < mesh_.triangles.size() && texels <= most; ++seed)
+      if (chart_of_[seed] == kNone && !normals_[seed].isZero()) {
         charts.push_back(grow(seed, std::uint32_t(charts.size())));
+        texels += charts.back().texels.size();
+      }
     return charts;
   }
 
@@ -212,6 +216,20 @@ class Charter {
   std::vector<ChartTexel> claims_;
 };
 
+/// No texel can be smaller than this: projected along a chart's axis, areas and lengths shrink to cos 60° at most, and
+/// all areas together and each edge must fit. Memory follows the texture, whatever the photographs resolve.
+double least_texel(const hull::Mesh& mesh, int max_side) {
+  double area = 0, longest = 0;
+  for (const auto& t : mesh.triangles) {
+    const Eigen::Vector3d a = mesh.vertices[t[0]].cast<double>(), b = mesh.vertices[t[1]].cast<double>(),
+                          c = mesh.vertices[t[2]].cast<double>();
+    area += 0.5 * (b - a).cross(c - a).norm();
+    longest = std::max({longest, (b - a).norm(), (c - b).norm(), (a - c).norm()});
+  }
+  // An edge may lie along the diagonal of its box.
+  return std::max(std::sqrt(kMinCosine * area), kMinCosine / std::sqrt(2.0) * longest) / max_side;
+}
+
 /// Rows of falling height, `width` wide; the height that they need.
 int pack(std::vector<Chart>& charts, int width) {
   std::vector<std::size_t> order(charts.size());
@@ -236,7 +254,8 @@ Atlas make_atlas(const hull::Mesh& mesh, double texel_size, int max_side) {
   Eigen::AlignedBox3f box;
   for (const auto& v : mesh.vertices) box.extend(v);
   // An object smaller than a pixel still gets some texels.
-  texel_size = std::min(texel_size, 0.125 * double(box.diagonal().norm()));
+  texel_size = std::min(std::max(texel_size, least_texel(mesh, max_side)), 0.125 * double(box.diagonal().norm()));
+  const std::size_t most = std::size_t(max_side) * std::size_t(max_side);
   for (;; texel_size *= 1.15) {
     if (texel_size > box.diagonal().norm())
       throw Error(ErrorCode::invalid_argument, "the mesh of " + std::to_string(mesh.triangles.size()) +
@@ -244,7 +263,7 @@ Atlas make_atlas(const hull::Mesh& mesh, double texel_size, int max_side) {
                                                    std::to_string(max_side) + " x " + std::to_string(max_side) +
                                                    ": allow a larger one or simplify");
     Charter charter(mesh, float(texel_size), max_side);
-    std::vector<Chart> charts = charter.run();
+    std::vector<Chart> charts = charter.run(most);
     double area = 0;
     int widest = 4;
     for (const Chart& c : charts) {

@@ -7,6 +7,7 @@
 
 #include "frame.h"
 #include "photo_cache.h"
+#include "photo_options.h"
 #include "source_ranking.h"
 
 namespace lumihull::slf {
@@ -15,14 +16,13 @@ namespace {
 constexpr std::size_t kTilesAtOnce =
     256;  // their samples and sources are in memory at a time: about 100 MB at 2 x 2 rays
 
-void require(bool good, const char* what) {
-  if (!good) throw Error(ErrorCode::invalid_argument, what, "lumigraph options");
-}
-
-float box_diagonal(const hull::Mesh& mesh) {
-  Eigen::AlignedBox3f box;
-  for (const auto& v : mesh.vertices) box.extend(v);
-  return box.isEmpty() ? 0.0f : box.diagonal().norm();
+void check(const LumigraphOptions& o) {
+  constexpr const char* kWhose = "lumigraph options";
+  require(o.photographs >= 1 && o.photographs <= 16, "photographs: expected 1 to 16", kWhose);
+  require(o.angle_power >= 0 && o.angle_power <= 10, "angle_power: expected 0 to 10", kWhose);
+  require(o.resolution_penalty >= 0 && o.resolution_penalty <= 10, "resolution_penalty: expected 0 to 10", kWhose);
+  require(o.border_px >= 0 && o.border_px <= 1e4, "border_px: expected 0 to 10000", kWhose);
+  check_photo_options(o, kWhose);
 }
 
 /// A tile on its way: the samples, which pixel's point each of them belongs to, and what they blend.
@@ -51,8 +51,8 @@ struct Lumigraph::Impl {
         scene(s),
         options(o),
         normals(hull::vertex_normals(m)),
-        cache(std::move(photos), {float(o.erosion_px), float(o.feather_px), float(o.edge_alpha)}, o.cache_bytes),
-        ranking(s, float(o.visibility_offset) * box_diagonal(m), cache.photos(), o) {}
+        cache(std::move(photos), edge_options(o), o.cache_bytes),
+        ranking(s, shadow_offset(m, o.visibility_offset), cache.photos(), o) {}
 
   Eigen::Vector3f normal_at(const hull::Hit& hit) const {
     const auto& t = mesh.triangles[hit.triangle];
@@ -104,15 +104,7 @@ struct Lumigraph::Impl {
 
 Lumigraph::Lumigraph(const hull::Mesh& mesh, const hull::RayScene& scene, PhotoSet photos,
                      const LumigraphOptions& options) {
-  require(options.photographs >= 1 && options.photographs <= 16, "photographs: expected 1 to 16");
-  require(options.angle_power >= 0 && options.angle_power <= 10, "angle_power: expected 0 to 10");
-  require(options.resolution_penalty >= 0 && options.resolution_penalty <= 10, "resolution_penalty: expected 0 to 10");
-  require(options.visibility_offset >= 0 && options.visibility_offset <= 1, "visibility_offset: expected 0 to 1");
-  require(options.min_cosine >= 0 && options.min_cosine < 1, "min_cosine: expected 0 to less than 1");
-  require(options.erosion_px >= 0 && options.erosion_px <= 64, "erosion_px: expected 0 to 64");
-  require(options.feather_px >= 0 && options.feather_px <= 16, "feather_px: expected 0 to 16");
-  require(options.edge_alpha >= 0 && options.edge_alpha <= 1, "edge_alpha: expected 0 to 1");
-  require(options.border_px >= 0 && options.border_px <= 1e4, "border_px: expected 0 to 10000");
+  check(options);
   validate(photos);
   if (photos.size() == 0) throw Error(ErrorCode::degenerate, "there is no photograph to blend");
   hull::validate(mesh, "mesh");

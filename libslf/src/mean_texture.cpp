@@ -11,6 +11,7 @@
 
 #include "atlas.h"
 #include "color.h"
+#include "photo_options.h"
 #include "prepared_photo.h"
 #include "surface_fill.h"
 
@@ -20,20 +21,21 @@ namespace {
 constexpr std::size_t kBlocksAtOnce = 64;  // a chunk of parallel work
 constexpr float kFlatView = 1e-3f;         // what a view flatter than min_cosine still counts
 
-void require(bool good, const char* what) {
-  if (!good) throw Error(ErrorCode::invalid_argument, what, "texture options");
+void check(const TextureOptions& o) {
+  constexpr const char* kWhose = "texture options";
+  require(o.max_side >= 64 && o.max_side <= 16384, "max_side: expected 64 to 16384", kWhose);
+  require(o.texel_px >= 0.1 && o.texel_px <= 100, "texel_px: expected 0.1 to 100", kWhose);
+  require(o.cosine_power >= 0 && o.cosine_power <= 20, "cosine_power: expected 0 to 20", kWhose);
+  require(o.resolution_power >= 0 && o.resolution_power <= 10, "resolution_power: expected 0 to 10", kWhose);
+  check_photo_options(o, kWhose);
 }
 
-void check(const TextureOptions& o) {
-  require(o.max_side >= 64 && o.max_side <= 16384, "max_side: expected 64 to 16384");
-  require(o.texel_px >= 0.1 && o.texel_px <= 100, "texel_px: expected 0.1 to 100");
-  require(o.cosine_power >= 0 && o.cosine_power <= 20, "cosine_power: expected 0 to 20");
-  require(o.resolution_power >= 0 && o.resolution_power <= 10, "resolution_power: expected 0 to 10");
-  require(o.min_cosine >= 0 && o.min_cosine < 1, "min_cosine: expected 0 to less than 1");
-  require(o.visibility_offset >= 0 && o.visibility_offset <= 1, "visibility_offset: expected 0 to 1");
-  require(o.erosion_px >= 0 && o.erosion_px <= 64, "erosion_px: expected 0 to 64");
-  require(o.feather_px >= 0 && o.feather_px <= 16, "feather_px: expected 0 to 16");
-  require(o.edge_alpha >= 0 && o.edge_alpha <= 1, "edge_alpha: expected 0 to 1");
+/// Geometric mean of both focal lengths, px.
+double focal_length(const Camera& camera) { return camera.f * std::sqrt(camera.s); }
+
+double median(std::vector<double>& values) {
+  std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2), values.end());
+  return values[values.size() / 2];
 }
 
 /// World size of a pixel of the photograph that resolves a triangle best, median over the surface.
@@ -50,44 +52,48 @@ double finest_pixel(const hull::Mesh& mesh, const PhotoSet& photos) {
       const Eigen::Vector3d away = view.center() - middle;
       const double distance = away.norm();
       if (!(away.dot(n) > 0.3 * distance)) continue;
-      best = std::min(best, distance / (view.camera.f * std::sqrt(view.camera.s)));
+      best = std::min(best, distance / focal_length(view.camera));
     }
     if (std::isfinite(best)) sizes.push_back(best);
   }
   if (sizes.empty()) {  // nothing is seen from the front: the size does not matter much
     for (const View& view : photos.views)
-      sizes.push_back((view.center() - mesh.vertices[0].cast<double>()).norm() / view.camera.f);
+      sizes.push_back((view.center() - mesh.vertices[0].cast<double>()).norm() / focal_length(view.camera));
   }
-  std::nth_element(sizes.begin(), sizes.begin() + sizes.size() / 2, sizes.end());
-  return std::max(sizes[sizes.size() / 2], 1e-30);
+  return std::max(median(sizes), 1e-30);
 }
 
 /// Adds photographs to the sums of all texels.
 class Accumulator {
  public:
-  Accumulator(const hull::Mesh& mesh, const hull::RayScene& scene, const Atlas& atlas, const TextureOptions& options)
+  Accumulator(const hull::Mesh& mesh, const hull::RayScene& scene, const Atlas& atlas, const PhotoSet& photos,
+              const TextureOptions& options)
       : mesh_(mesh),
         scene_(scene),
         atlas_(atlas),
         options_(options),
         normals_(hull::vertex_normals(mesh)),
-        sums_(atlas.texels.size()) {
+        sums_(atlas.texels.size()),
+        offset_(shadow_offset(mesh, options.visibility_offset)) {
+    // An ordinary photograph's pixel: weights are about 1 whatever the unit (see kTrusted of surface_fill.cpp).
     Eigen::AlignedBox3f box;
     for (const auto& v : mesh.vertices) box.extend(v);
-    offset_ = float(options.visibility_offset) * box.diagonal().norm();
-    middle_ = box.center();
+    std::vector<double> sizes;
+    for (const View& view : photos.views)
+      sizes.push_back((view.center() - box.center().cast<double>()).norm() / focal_length(view.camera));
+    ordinary_pixel_ = std::max(median(sizes), 1e-30);
   }
 
   void add(const View& view, const PreparedPhoto& photo, Job& job) {
     const std::size_t blocks = atlas_.blocks.size() - 1;
     const Projector projector(view);
-    const float reference = (projector.center - middle_).norm();
+    const auto ordinary_distance = float(ordinary_pixel_ * focal_length(view.camera));
     parallel_chunks(job, blocks, kBlocksAtOnce, [&](std::size_t first, std::size_t last) {
       std::vector<Seen> seen;
       std::vector<hull::Ray> rays;
       std::vector<std::uint8_t> hidden;
       for (std::size_t b = first; b < last; ++b) {
-        candidates(atlas_.blocks[b], atlas_.blocks[b + 1], projector, reference, seen);
+        candidates(atlas_.blocks[b], atlas_.blocks[b + 1], projector, ordinary_distance, seen);
         if (seen.empty()) continue;
         remove_hidden(seen, projector.center, rays, hidden);
         for (const Seen& s : seen) {
@@ -132,7 +138,7 @@ class Accumulator {
     Eigen::Matrix2d jacobian;
   };
 
-  void candidates(std::uint32_t first, std::uint32_t last, const Projector& projector, float reference,
+  void candidates(std::uint32_t first, std::uint32_t last, const Projector& projector, float ordinary_distance,
                   std::vector<Seen>& seen) const {
     seen.clear();
     std::optional<LensPatch> patch;
@@ -164,7 +170,7 @@ class Accumulator {
       if (!camera.contains(pixel)) continue;
       const float distance = away.norm(), cosine = facing / (distance * std::max(normal.norm(), 1e-12f));
       float weight = std::pow(cosine, float(options_.cosine_power)) *
-                     std::pow(reference / distance, float(2 * options_.resolution_power));
+                     std::pow(ordinary_distance / distance, float(2 * options_.resolution_power));
       if (cosine < float(options_.min_cosine)) weight *= kFlatView;
       if (!(weight > 0)) continue;
       seen.push_back({i, weight, pixel.cast<float>(), place});
@@ -204,8 +210,8 @@ class Accumulator {
   const TextureOptions& options_;
   std::vector<Eigen::Vector3f> normals_;
   std::vector<BlendColor> sums_;
-  float offset_ = 0;
-  Eigen::Vector3f middle_;
+  float offset_;
+  double ordinary_pixel_;  // world units
 };
 
 }  // namespace
@@ -235,8 +241,8 @@ TexturedMesh mean_texture(const hull::Mesh& mesh, const PhotoSet& photos, const 
   const Atlas atlas = make_atlas(mesh, options.texel_px * finest_pixel(mesh, photos), options.max_side);
 
   // One photograph's pixels at a time; the next few are read while nothing else needs the threads.
-  const EdgeOptions edge{float(options.erosion_px), float(options.feather_px), float(options.edge_alpha)};
-  Accumulator accumulator(mesh, scene, atlas, options);
+  const EdgeOptions edge = edge_options(options);
+  Accumulator accumulator(mesh, scene, atlas, photos, options);
   job.begin("texture", photos.size());
   const std::size_t at_once = std::max(1u, std::min(job.threads(), 8u));
   for (std::size_t first = 0; first < photos.size(); first += at_once) {

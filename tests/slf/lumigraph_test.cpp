@@ -13,25 +13,10 @@ namespace {
 using test::around;
 using test::camera;
 
-/// The synthetic photographs' rims are mixed with green; without them a plain object is plain to its edge.
 slf::LumigraphOptions no_trace() {
   slf::LumigraphOptions options;
-  options.edge_alpha = 0.98;
+  options.edge_alpha = test::kNoTrace;
   return options;
-}
-
-/// Largest difference to a colour over the pixels that are covered at all.
-int largest_difference(const Image& rgba, const std::array<int, 3>& color) {
-  int worst = 0, covered = 0;
-  for (int y = 0; y < rgba.height(); ++y)
-    for (int x = 0; x < rgba.width(); ++x) {
-      const std::uint8_t* p = rgba.row<std::uint8_t>(y) + 4 * x;
-      if (p[3] == 0) continue;
-      ++covered;
-      for (int c = 0; c < 3; ++c) worst = std::max(worst, std::abs(int(p[c]) - color[c]));
-    }
-  EXPECT_GT(covered, 100);
-  return worst;
 }
 
 TEST(Lumigraph, AViewFromAPhotographsPlaceIsThatPhotograph) {
@@ -79,7 +64,7 @@ TEST(Lumigraph, APlainObjectIsPlainEverywhere) {
                            no_trace());
   Job job;
   for (const View& view : around(3, 3, 3.1, bent))
-    EXPECT_LE(largest_difference(lumigraph.render(view, {}, job).rgba, {200, 90, 30}), 1);
+    EXPECT_LE(test::largest_difference(lumigraph.render(view, {}, job).rgba, {200, 90, 30}), 1);
 }
 
 TEST(Lumigraph, AnOccludersColourDoesNotLeak) {
@@ -155,7 +140,7 @@ TEST(Lumigraph, WhatNoPhotographSawTakesTheColoursAround) {
   slf::Lumigraph lumigraph(mesh, scene, test::photographs(mesh, test::plain(120, 60, 180), {front}), no_trace());
   Job job;
   const View side{camera(100, 100, 100), look_at({4, 0.5, 0}, {0, 0, 0}, {0, 0, 1})};
-  EXPECT_LE(largest_difference(lumigraph.render(side, {}, job).rgba, {120, 60, 180}), 1);
+  EXPECT_LE(test::largest_difference(lumigraph.render(side, {}, job).rgba, {120, 60, 180}), 1);
 }
 
 TEST(Lumigraph, Faults) {

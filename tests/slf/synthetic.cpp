@@ -1,9 +1,11 @@
 #include "synthetic.h"
 
+#include <gtest/gtest.h>
 #include <lumihull/hull/ray_scene.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <numbers>
 
@@ -118,6 +120,19 @@ slf::PhotoSet photographs(const hull::Mesh& mesh, const Paint& paint, const std:
   set.views = views;
   set.read = [kept](std::size_t i) { return kept->at(i); };
   return set;
+}
+
+int largest_difference(const Image& rgba, const std::array<int, 3>& color) {
+  int worst = 0, covered = 0;
+  for (int y = 0; y < rgba.height(); ++y)
+    for (int x = 0; x < rgba.width(); ++x) {
+      const std::uint8_t* p = rgba.row<std::uint8_t>(y) + 4 * x;
+      if (p[3] == 0) continue;
+      ++covered;
+      for (std::size_t c = 0; c < 3; ++c) worst = std::max(worst, std::abs(int(p[c]) - color[c]));
+    }
+  EXPECT_GT(covered, 100);
+  return worst;
 }
 
 }  // namespace lumihull::test

@@ -7,6 +7,7 @@
 #include <lumihull/slf/photos.h>
 
 #include <Eigen/Core>
+#include <array>
 #include <functional>
 #include <vector>
 
@@ -33,5 +34,11 @@ std::vector<View> around(int per_ring, int rings, double distance, const Camera&
 slf::Photo photograph(const hull::Mesh& mesh, const Paint& paint, const View& view);
 /// All of them, taken at once and kept.
 slf::PhotoSet photographs(const hull::Mesh& mesh, const Paint& paint, const std::vector<View>& views);
+
+/// An edge_alpha for them: their rims are mixed with green; without them a plain object is plain to its edge.
+inline constexpr double kNoTrace = 0.98;
+
+/// Largest difference to a colour over the pixels that are covered at all; fails the test where they are few.
+int largest_difference(const Image& rgba, const std::array<int, 3>& color);
 
 }  // namespace lumihull::test

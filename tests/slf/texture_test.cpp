@@ -20,24 +20,10 @@ using test::camera;
 
 std::vector<View> eight_by_three(int size = 120) { return around(8, 3, 4, camera(size, size, size)); }
 
-/// The synthetic photographs' rims are mixed with green; without them a plain object is plain to its edge.
 slf::TextureOptions no_trace() {
   slf::TextureOptions options;
-  options.edge_alpha = 0.98;
+  options.edge_alpha = test::kNoTrace;
   return options;
-}
-
-int largest_difference(const Image& rgba, const std::array<int, 3>& color) {
-  int worst = 0, covered = 0;
-  for (int y = 0; y < rgba.height(); ++y)
-    for (int x = 0; x < rgba.width(); ++x) {
-      const std::uint8_t* p = rgba.row<std::uint8_t>(y) + 4 * x;
-      if (p[3] == 0) continue;
-      ++covered;
-      for (int c = 0; c < 3; ++c) worst = std::max(worst, std::abs(int(p[c]) - color[c]));
-    }
-  EXPECT_GT(covered, 100);
-  return worst;
 }
 
 double quality(const slf::TexturedMesh& textured, const test::Paint& paint, const View& view) {
@@ -81,7 +67,7 @@ TEST(MeanTexture, APlainObjectIsPlainEverywhere) {
       slf::mean_texture(mesh, test::photographs(mesh, test::plain(200, 90, 30), eight_by_three()), no_trace(), job);
   const hull::RayScene scene(mesh);
   for (const View& view : around(3, 3, 3.1, camera(200, 200, 180)))
-    EXPECT_LE(largest_difference(slf::render_texture(textured, scene, view, {}, job).rgba, {200, 90, 30}), 1);
+    EXPECT_LE(test::largest_difference(slf::render_texture(textured, scene, view, {}, job).rgba, {200, 90, 30}), 1);
   for (std::size_t i = 0; i < textured.texture.bytes(); i += 3)  // between the charts, too
     ASSERT_NEAR(int(textured.texture.data()[i]), 200, 1);
 }
@@ -110,6 +96,28 @@ TEST(MeanTexture, AnOccludersColourDoesNotLeak) {
         ++sampled;
       }
   EXPECT_LT(red, sampled / 50);
+}
+
+TEST(MeanTexture, PhotographsCountByTheSizeOfTheirPixels) {
+  // A bright photograph from two units before a face, a dark one from four: four to one where both have one lens, one
+  // to one where the farther one's is twice as long.
+  const hull::Mesh mesh = test::box({-1, -1, -1}, {1, 1, 1});
+  Job job;
+  for (const double longer : {1.0, 2.0}) {
+    SCOPED_TRACE(longer);
+    const View near{camera(120, 120, 80), look_at({0, 3, 0}, {0, 0, 0}, {0, 0, 1})};
+    const View far{camera(120, 120, 80 * longer), look_at({0, 5, 0}, {0, 0, 0}, {0, 0, 1})};
+    slf::PhotoSet photos = test::photographs(mesh, test::plain(200, 200, 200), {near});
+    photos.names.push_back("far");
+    photos.views.push_back(far);
+    photos.read = [read = photos.read, dark = test::photograph(mesh, test::plain(50, 50, 50), far)](std::size_t i) {
+      return i == 0 ? read(0) : dark;
+    };
+    const slf::TexturedMesh textured = slf::mean_texture(mesh, photos, {}, job);
+    const hull::RayScene scene(mesh);
+    const Image picture = slf::render_texture(textured, scene, near, {}, job).rgba;
+    EXPECT_NEAR(picture.row<std::uint8_t>(60)[4 * 60], longer == 1 ? (4 * 200 + 50) / 5 : 125, 2);
+  }
 }
 
 TEST(MeanTexture, NoTexelShowsTwoPlaces) {
@@ -148,7 +156,7 @@ TEST(MeanTexture, PlacesThatNobodySawAreFilledFromAround) {
   EXPECT_LT(report.filled_share, 0.8);
   const hull::RayScene scene(mesh);
   const View back{camera(100, 100, 100), look_at({0, -4, 0}, {0, 0, 0}, {0, 0, 1})};
-  EXPECT_LE(largest_difference(slf::render_texture(textured, scene, back, {}, job).rgba, {120, 60, 180}), 1);
+  EXPECT_LE(test::largest_difference(slf::render_texture(textured, scene, back, {}, job).rgba, {120, 60, 180}), 1);
 }
 
 TEST(MeanTexture, ThreadsDoNotChangeABit) {
@@ -187,6 +195,13 @@ TEST(MeanTexture, StaysWithinItsSize) {
   const slf::TexturedMesh textured = slf::mean_texture(mesh, photos, options, job);
   EXPECT_LE(textured.texture.width(), 128);
   EXPECT_LE(textured.texture.height(), 128);
+  // A photograph that resolves ten thousand times more than fits: memory follows the texture, not the photograph.
+  const View close{camera(24, 24, 4e5), look_at({0, 4, 0}, {0, 0, 0}, {0, 0, 1})};
+  const slf::TexturedMesh enlarged =
+      slf::mean_texture(mesh, test::photographs(mesh, test::plain(9, 9, 9), {close}), options, job);
+  EXPECT_LE(enlarged.texture.width(), 128);
+  EXPECT_LE(enlarged.texture.height(), 128);
+  EXPECT_GT(enlarged.texture.width() * enlarged.texture.height(), 128 * 128 / 3);
   // Too many pieces for it: 2,000 loose triangles need four texels each, at least.
   hull::Mesh pieces;
   for (int i = 0; i < 2000; ++i) {

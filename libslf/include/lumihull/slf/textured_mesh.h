@@ -26,11 +26,12 @@ struct TexturedMesh {
 LUMIHULL_API void validate(const TexturedMesh& textured, const std::string& name);
 
 struct TextureOptions {
-  int max_side = 4096;          ///< largest width and height of the texture, 64 … 16384
-  double texel_px = 0.7;        ///< size of a texel in pixels of the photographs, at the median over the surface
-  double cosine_power = 3;      ///< a photograph's weight falls with cosine^power of its viewing angle; >= 0
-  double resolution_power = 1;  ///< ... and with depth^(-2 power): nearer photographs count more; >= 0
-  double min_cosine = 0.15;     ///< flatter views are not used where there is any other; 0 … 1
+  int max_side = 4096;      ///< largest width and height of the texture, 64 … 16384
+  double texel_px = 0.7;    ///< size of a texel in pixels of the photographs, at the median over the surface
+  double cosine_power = 3;  ///< a photograph's weight falls with cosine^power of its viewing angle; >= 0
+  double resolution_power =
+      1;                     ///< ... and with pixel^(-2 power), pixel: its size at the surface, as distance / f; >= 0
+  double min_cosine = 0.15;  ///< flatter views are not used where there is any other; 0 … 1
   double visibility_offset =
       0.003;              ///< how far beside the surface a shadow starts to count, in diagonals of the mesh's box
   double erosion_px = 0;  ///< rim of the photographs' silhouettes that counts next to nothing, px
