@@ -1,10 +1,9 @@
 #include "bit_mask.h"
 
 #include <bit>
-#include <cstring>
 #include <numeric>
 
-#if defined(__BMI2__) || defined(__AVX2__)
+#ifdef __AVX2__
 #include <immintrin.h>
 #endif
 
@@ -114,16 +113,20 @@ BitMask::BitMask(const Image& mask) : BitMask(mask.width(), mask.height()) {
 }
 
 Image BitMask::expanded() const {
-  Image out(width, height, 1);
+  Image out = Image::uninitialized(width, height, 1);
   for (int y = 0; y < height; ++y) {
     const std::uint64_t* in = row(y);
     std::uint8_t* pixels = out.row<std::uint8_t>(y);
     int x = 0;
-#ifdef __BMI2__
-    for (; x + 8 <= width; x += 8) {
-      const std::uint64_t eight = in[x >> 6] >> (x & 63) & 0xFF;
-      const std::uint64_t bytes = _pdep_u64(eight, 0x0101010101010101u) * 255;
-      std::memcpy(pixels + x, &bytes, 8);
+#ifdef __AVX2__
+    // Each byte of 32 bits eight times, then its bit by lane.
+    const __m256i spread = _mm256_setr_epi8(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1,  //
+                                            2, 2, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3, 3, 3, 3);
+    const __m256i lane_bit = _mm256_set1_epi64x(std::int64_t(0x8040201008040201u));
+    for (; x + 32 <= width; x += 32) {
+      const __m256i source = _mm256_set1_epi32(std::int32_t(std::uint32_t(in[x >> 6] >> (x & 63))));
+      const __m256i own = _mm256_and_si256(_mm256_shuffle_epi8(source, spread), lane_bit);
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(pixels + x), _mm256_cmpeq_epi8(own, lane_bit));
     }
 #endif
     for (; x < width; ++x) pixels[x] = (in[x >> 6] >> (x & 63) & 1) ? 255 : 0;
@@ -140,24 +143,53 @@ BitMask complement(const BitMask& mask) {
   return out;
 }
 
+namespace {
+
+/// Whether both horizontal neighbours are set, for a row's words; `last` holds the last word, with what lies beyond the
+/// picture set. Three loops, so that the middle one has neither branches nor ends.
+void both_sides(const std::uint64_t* row, int words, std::uint64_t last, std::uint64_t* out) {
+  const int end = words - 1;
+  const auto sides = [](std::uint64_t before, std::uint64_t here, std::uint64_t after) {
+    return (here << 1 | before >> 63) & (here >> 1 | after << 63);
+  };
+  constexpr std::uint64_t kBeyond = ~std::uint64_t(0);
+  if (end == 0) {
+    out[0] = sides(kBeyond, last, kBeyond);
+    return;
+  }
+  out[0] = sides(kBeyond, row[0], end == 1 ? last : row[1]);
+  for (int w = 1; w + 1 < end; ++w) out[w] = sides(row[w - 1], row[w], row[w + 1]);
+  if (end > 1) out[end - 1] = sides(row[end - 2], row[end - 1], last);
+  out[end] = sides(row[end - 1], last, kBeyond);
+}
+
+}  // namespace
+
 BitMask eroded(const BitMask& mask, bool eight_neighbours) {
   BitMask out(mask.width, mask.height);
-  const int last = mask.words - 1;
-  // A word of row y, and the same moved by one pixel to the left and right.
-  const auto word = [&](int y, int w) {
-    if (y < 0 || y >= mask.height || w < 0 || w > last) return ~std::uint64_t(0);
-    return w == last ? mask.row(y)[w] | ~mask.last_word_mask() : mask.row(y)[w];
+  const std::size_t words = std::size_t(mask.words);
+  const std::uint64_t beyond = ~mask.last_word_mask();
+  const std::vector<std::uint64_t> outside(words, ~std::uint64_t(0));
+  // Of three rows, each judged once: are both sides of a pixel set?
+  std::vector<std::uint64_t> sides[3];
+  for (auto& s : sides) s = outside;
+  const auto judge = [&](int y) {
+    both_sides(mask.row(y), mask.words, mask.row(y)[words - 1] | beyond, sides[(y + 3) % 3].data());
   };
-  const auto sides = [&](int y, int w) {
-    const std::uint64_t here = word(y, w);
-    return (here << 1 | word(y, w - 1) >> 63) & (here >> 1 | word(y, w + 1) << 63);
-  };
+  judge(0);
   for (int y = 0; y < mask.height; ++y) {
-    for (int w = 0; w < mask.words; ++w) {
-      std::uint64_t bits = word(y, w) & sides(y, w) & word(y - 1, w) & word(y + 1, w);
-      if (eight_neighbours) bits &= sides(y - 1, w) & sides(y + 1, w);
-      out.row(y)[w] = w == last ? bits & mask.last_word_mask() : bits;
-    }
+    const bool below = y + 1 < mask.height;
+    if (below) judge(y + 1);
+    const std::uint64_t* here = mask.row(y);
+    const std::uint64_t* up = y > 0 ? mask.row(y - 1) : outside.data();
+    const std::uint64_t* down = below ? mask.row(y + 1) : outside.data();
+    const std::uint64_t* side = sides[y % 3].data();
+    std::uint64_t* to = out.row(y);
+    for (std::size_t w = 0; w < words; ++w) to[w] = here[w] & side[w] & up[w] & down[w];
+    if (!eight_neighbours) continue;
+    const std::uint64_t* up_side = y > 0 ? sides[(y + 2) % 3].data() : outside.data();
+    const std::uint64_t* down_side = below ? sides[(y + 1) % 3].data() : outside.data();
+    for (std::size_t w = 0; w < words; ++w) to[w] &= up_side[w] & down_side[w];
   }
   return out;
 }

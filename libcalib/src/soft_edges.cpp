@@ -5,7 +5,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <optional>
+
+#ifdef __AVX2__
+#include <immintrin.h>
+#endif
 
 namespace lumihull::calib {
 namespace {
@@ -20,15 +23,73 @@ struct Mean {
   std::array<int, 3> sum{};
 };
 
+#ifdef __AVX2__
+/// Bytes of a row of seven pixels (RGB, eleven bytes too many) where the pixel's bit is set.
+alignas(32) constexpr std::array<std::array<std::uint8_t, 32>, 128> kSetBytes = [] {
+  std::array<std::array<std::uint8_t, 32>, 128> bytes{};
+  for (std::size_t bits = 0; bits < 128; ++bits)
+    for (std::size_t i = 0; i < 21; ++i) bytes[bits][i] = (bits >> (i / 3) & 1) ? 255 : 0;
+  return bytes;
+}();
+
+/// Sums of the bytes whose number is 0, 1 or 2 modulo 3.
+class ChannelSums {
+ public:
+  void add(const std::uint8_t* bytes, std::uint64_t window) {
+    const __m256i set = _mm256_load_si256(reinterpret_cast<const __m256i*>(kSetBytes[window].data()));
+    const __m256i here = _mm256_and_si256(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(bytes)), set);
+    for (std::size_t c = 0; c < 3; ++c)
+      sums_[c] =
+          _mm256_add_epi64(sums_[c], _mm256_sad_epu8(_mm256_shuffle_epi8(here, channel(c)), _mm256_setzero_si256()));
+  }
+  int sum(std::size_t c) const {
+    const __m128i two = _mm_add_epi64(_mm256_castsi256_si128(sums_[c]), _mm256_extracti128_si256(sums_[c], 1));
+    return int(_mm_cvtsi128_si64(two) + _mm_extract_epi64(two, 1));
+  }
+
+ private:
+  /// Picks a channel's bytes of each half (the upper half starts at byte 16, which is channel 1).
+  static __m256i channel(std::size_t c) {
+    const char n = -1;
+    const __m256i pick[3] = {_mm256_setr_epi8(0, 3, 6, 9, 12, 15, n, n, n, n, n, n, n, n, n, n, 2, n, n, n, n, n, n, n,
+                                              n, n, n, n, n, n, n, n),
+                             _mm256_setr_epi8(1, 4, 7, 10, 13, n, n, n, n, n, n, n, n, n, n, n, 0, 3, n, n, n, n, n, n,
+                                              n, n, n, n, n, n, n, n),
+                             _mm256_setr_epi8(2, 5, 8, 11, 14, n, n, n, n, n, n, n, n, n, n, n, 1, 4, n, n, n, n, n, n,
+                                              n, n, n, n, n, n, n, n)};
+    return pick[c];
+  }
+  __m256i sums_[3] = {_mm256_setzero_si256(), _mm256_setzero_si256(), _mm256_setzero_si256()};
+};
+#endif
+
 /// Sum of the colours of a window's pixels that are set.
 Mean mean_of(const BitMask& mask, const Image& rgb, int x, int y) {
   Mean mean;
   const int x0 = std::max(0, x - kRadius), x1 = std::min(mask.width - 1, x + kRadius);
-  for (int v = std::max(0, y - kRadius); v <= std::min(mask.height - 1, y + kRadius); ++v) {
+  const int y0 = std::max(0, y - kRadius), y1 = std::min(mask.height - 1, y + kRadius);
+  const auto window_of = [&](int v) {
     const std::uint64_t* row = mask.row(v);
     std::uint64_t window = row[x0 >> 6] >> (x0 & 63);
     if ((x0 >> 6) != (x1 >> 6)) window |= row[x1 >> 6] << (64 - (x0 & 63));
-    window &= (std::uint64_t(1) << (x1 - x0 + 1)) - 1;
+    return window & ((std::uint64_t(1) << (x1 - x0 + 1)) - 1);
+  };
+#ifdef __AVX2__
+  // 32 bytes of a row are read: of the picture's last row, too.
+  if (y1 + 1 < mask.height || 3 * x0 + 32 <= 3 * mask.width) {
+    ChannelSums sums;
+    for (int v = y0; v <= y1; ++v) {
+      const std::uint64_t window = window_of(v);
+      if (window == 0) continue;
+      mean.count += std::popcount(window);
+      sums.add(rgb.row<std::uint8_t>(v) + 3 * x0, window);
+    }
+    for (std::size_t c = 0; c < 3; ++c) mean.sum[c] = sums.sum(c);
+    return mean;
+  }
+#endif
+  for (int v = y0; v <= y1; ++v) {
+    std::uint64_t window = window_of(v);
     const std::uint8_t* pixels = rgb.row<std::uint8_t>(v);
     for (; window; window &= window - 1) {
       const std::uint8_t* p = pixels + 3 * (x0 + std::countr_zero(window));

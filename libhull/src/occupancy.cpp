@@ -3,6 +3,7 @@
 #include <lumihull/base/parallel.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "block_kernel.h"
@@ -69,7 +70,7 @@ class Splitter {
 
 }  // namespace
 
-Occupancy occupancy(const HullFunction::Impl& function, const Box& box, int size, Job& job) {
+Occupancy occupancy(const HullFunction::Impl& function, const Box& box, int size, double share, Job& job) {
   Occupancy cells{box, size, {}};
   std::vector<std::uint32_t> seen(std::size_t(size) * size * size);
   const Splitter splitter(function, box, size, seen);
@@ -82,7 +83,8 @@ Occupancy occupancy(const HullFunction::Impl& function, const Box& box, int size
   });
   const std::uint32_t best = *std::max_element(seen.begin(), seen.end());
   // What one view alone sees goes on without end.
-  const std::uint32_t least = best > 0 ? std::max((best - 1 + 3) / 4, std::min(best - 1, 2u)) : 0;
+  const std::uint32_t most = best > 0 ? best - 1 : 0;
+  const std::uint32_t least = std::max(std::uint32_t(std::ceil(share * most)), std::min(most, 2u));
   cells.occupied.resize(seen.size());
   for (std::size_t i = 0; i < seen.size(); ++i) cells.occupied[i] = seen[i] > 0 && seen[i] - 1 >= least;
   return cells;

@@ -19,9 +19,10 @@ struct Occupancy {
   std::size_t index(int x, int y, int z) const { return (std::size_t(z) * size + y) * size + x; }
 };
 
-/// size: a power of two. Cells that less than a quarter as many views see whole as the best seen occupied cell are not
-/// occupied, nor those that one view alone sees: what only few pictures contain says little about where the object is.
-Occupancy occupancy(const HullFunction::Impl& function, const Box& box, int size, Job& job);
+/// size: a power of two. Cells that fewer views see whole than `share` (0 … 1) of those that see the best seen occupied
+/// cell are not occupied, nor those that one view alone sees: what only few pictures contain says little about where
+/// the object is.
+Occupancy occupancy(const HullFunction::Impl& function, const Box& box, int size, double share, Job& job);
 
 /// Takes out connected parts (26 neighbours) of less than `min_share` of the largest part's cells.
 void remove_specks(Occupancy& cells, double min_share);

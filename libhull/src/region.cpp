@@ -136,6 +136,45 @@ Box grown(Box box, double share) {
   return {box.min - margin, box.max + margin};
 }
 
+/// Carves coarsely, grows the box where the hull goes on and tightens it; nullopt where it goes on without end.
+std::optional<Box> search(const HullFunction& function, Box box, bool contains_hull, double share,
+                          std::span<const std::string> names, Job& job) {
+  const double first_size = box.size().maxCoeff();
+  int empty = 0;
+  for (int round = 0; round < 40; ++round) {
+    job.check();
+    Occupancy cells = occupancy(function.impl(), box, kCells, share, job);
+    remove_specks(cells, 0.01);
+    std::array<int, 3> first, last;
+    if (!extent(cells, first, last)) {
+      // A start by rays may have missed it.
+      if (contains_hull || ++empty == 3) throw vanished(function, box, names, job);
+      box = grown(box, 0.5);
+      continue;
+    }
+    const Eigen::Vector3d cell = box.size() / kCells;
+    Box tight, grow = box;
+    bool touches = false;
+    double fill = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto a = Eigen::Index(axis);
+      tight.min[a] = box.min[a] + (first[axis] - 1) * cell[a];
+      tight.max[a] = box.min[a] + (last[axis] + 2) * cell[a];
+      if (first[axis] == 0) touches = true, grow.min[a] -= 0.3 * box.size()[a];
+      if (last[axis] == kCells - 1) touches = true, grow.max[a] += 0.3 * box.size()[a];
+      fill = std::max(fill, double(last[axis] - first[axis] + 1) / kCells);
+    }
+    if (touches) {
+      if (grow.size().maxCoeff() > 100 * first_size) return std::nullopt;
+      box = grow;
+      continue;
+    }
+    if (fill > 0.7) return tight;
+    box = tight;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 Box find_region(std::span<const View> all_views, std::span<const Silhouette> all_silhouettes, const CarveRule& all_rule,
@@ -165,40 +204,10 @@ Box find_region(std::span<const View> all_views, std::span<const Silhouette> all
   if (!start)
     throw Error(ErrorCode::degenerate,
                 "the views have no bounded region of space in common (they look along one direction); give a region");
-  Box box = grown(*start, 0.08);
-  const double first_size = box.size().maxCoeff();
-  int empty = 0;
-  for (int round = 0; round < 40; ++round) {
-    job.check();
-    Occupancy cells = occupancy(function.impl(), box, kCells, job);
-    remove_specks(cells, 0.01);
-    std::array<int, 3> first, last;
-    if (!extent(cells, first, last)) {
-      // A start by rays may have missed it.
-      if (contains_hull || ++empty == 3) throw vanished(function, box, names, job);
-      box = grown(box, 0.5);
-      continue;
-    }
-    const Eigen::Vector3d cell = box.size() / kCells;
-    Box tight, grow = box;
-    bool touches = false;
-    double fill = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto a = Eigen::Index(axis);
-      tight.min[a] = box.min[a] + (first[axis] - 1) * cell[a];
-      tight.max[a] = box.min[a] + (last[axis] + 2) * cell[a];
-      if (first[axis] == 0) touches = true, grow.min[a] -= 0.3 * box.size()[a];
-      if (last[axis] == kCells - 1) touches = true, grow.max[a] += 0.3 * box.size()[a];
-      fill = std::max(fill, double(last[axis] - first[axis] + 1) / kCells);
-    }
-    if (touches) {
-      if (grow.size().maxCoeff() > 100 * first_size) break;
-      box = grow;
-      continue;
-    }
-    if (fill > 0.7) return tight;
-    box = tight;
-  }
+  // A point that only a quarter as many views see as the best seen one counts, for the object may reach out of many
+  // pictures. Where that goes on without end (few views, some of them along one direction), more views are asked for.
+  for (const double share : {0.25, 0.5, 1.0})
+    if (const auto box = search(function, grown(*start, 0.08), contains_hull, share, names, job)) return *box;
   throw Error(ErrorCode::degenerate, "the hull goes on without end: the views do not enclose it; give a region");
 }
 

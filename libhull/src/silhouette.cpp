@@ -4,6 +4,7 @@
 #include <lumihull/base/error.h>
 #include <lumihull/hull/silhouette.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -14,6 +15,7 @@
 #include <immintrin.h>
 #endif
 
+#include "distance_band.h"
 #include "silhouette_data.h"
 #include "silhouette_frame.h"
 
@@ -43,12 +45,26 @@ struct BitMask {
   const std::uint64_t* row(int y) const { return &bits[std::size_t(y) * words]; }
   bool at(int x, int y) const { return row(y)[x / 64] >> (x % 64) & 1; }
 
+  /// What all pixels are whose centres lie in a rectangle or next to it; nullopt where they differ.
+  std::optional<bool> uniform(const Eigen::AlignedBox2d& px, int width, int height) const {
+    const auto within = [](double v, int size) { return int(std::clamp(std::floor(v), 0.0, size - 1.0)); };
+    const int x0 = within(px.min().x() - 0.5, width), x1 = within(px.max().x() + 0.5, width);
+    const int y0 = within(px.min().y() - 0.5, height), y1 = within(px.max().y() + 0.5, height);
+    const bool first = at(x0, y0);
+    const std::uint64_t wanted = first ? ~std::uint64_t(0) : 0;
+    for (int w = x0 / 64; w <= x1 / 64; ++w) {
+      std::uint64_t cared = ~std::uint64_t(0);
+      if (w == x0 / 64) cared <<= x0 % 64;
+      if (w == x1 / 64) cared &= ~std::uint64_t(0) >> (63 - x1 % 64);
+      std::uint64_t different = 0;
+      for (int y = y0; y <= y1; ++y) different |= row(y)[w] ^ wanted;
+      if (different & cared) return std::nullopt;
+    }
+    return first;
+  }
+
   int words;
   std::vector<std::uint64_t> bits;
-};
-
-struct Segment {
-  float ax, ay, bx, by;  // field coordinates
 };
 
 /// Marching squares between the centres of pixels.
@@ -109,72 +125,6 @@ class ContourTracer {
   const std::function<void(double, double, double, double)>& emit_;
 };
 
-/// Squared distances to the contour over the samples around it, in cells.
-class DistanceBand {
- public:
-  DistanceBand(const std::vector<Segment>& segments, float band, int samples_x, int samples_y) : band_(band) {
-    float x0 = std::numeric_limits<float>::max(), y0 = x0, x1 = -x0, y1 = -x0;
-    for (const Segment& s : segments) {
-      x0 = std::min({x0, s.ax, s.bx}), x1 = std::max({x1, s.ax, s.bx});
-      y0 = std::min({y0, s.ay, s.by}), y1 = std::max({y1, s.ay, s.by});
-    }
-    x0_ = std::clamp(int(std::floor(x0 - band)), 0, samples_x - 1);
-    y0_ = std::clamp(int(std::floor(y0 - band)), 0, samples_y - 1);
-    x1_ = std::clamp(int(std::ceil(x1 + band)), x0_, samples_x - 1);
-    y1_ = std::clamp(int(std::ceil(y1 + band)), y0_, samples_y - 1);
-    stride_ = std::size_t(x1_ - x0_ + 1) + 8;  // rows are written eight at a time
-    squared_.assign(stride_ * std::size_t(y1_ - y0_ + 1), std::numeric_limits<float>::max());
-    for (const Segment& s : segments) splat(s);
-  }
-
-  float at(int x, int y) const {
-    if (x < x0_ || x > x1_ || y < y0_ || y > y1_) return std::numeric_limits<float>::max();
-    return squared_[std::size_t(y - y0_) * stride_ + std::size_t(x - x0_)];
-  }
-
- private:
-  void splat(const Segment& s) {
-    const int xa = std::max(int(std::ceil(std::min(s.ax, s.bx) - band_)), x0_);
-    const int xb = std::min(int(std::floor(std::max(s.ax, s.bx) + band_)), x1_);
-    const int ya = std::max(int(std::ceil(std::min(s.ay, s.by) - band_)), y0_);
-    const int yb = std::min(int(std::floor(std::max(s.ay, s.by) + band_)), y1_);
-    const float dx = s.bx - s.ax, dy = s.by - s.ay;
-    const float length2 = dx * dx + dy * dy;
-    const float inverse = length2 > 0 ? 1 / length2 : 0;
-    for (int y = ya; y <= yb; ++y) {
-      float* row = &squared_[std::size_t(y - y0_) * stride_];
-      const float wy = float(y) - s.ay;
-      const float along = wy * dy;
-#ifdef __AVX2__
-      const __m256 lanes = _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7);
-      for (int x = xa; x <= xb; x += 8) {
-        const __m256 wx = _mm256_add_ps(_mm256_set1_ps(float(x) - s.ax), lanes);
-        __m256 t = _mm256_mul_ps(_mm256_add_ps(_mm256_mul_ps(wx, _mm256_set1_ps(dx)), _mm256_set1_ps(along)),
-                                 _mm256_set1_ps(inverse));
-        t = _mm256_min_ps(_mm256_max_ps(t, _mm256_setzero_ps()), _mm256_set1_ps(1));
-        const __m256 ex = _mm256_sub_ps(wx, _mm256_mul_ps(t, _mm256_set1_ps(dx)));
-        const __m256 ey = _mm256_sub_ps(_mm256_set1_ps(wy), _mm256_mul_ps(t, _mm256_set1_ps(dy)));
-        const __m256 d2 = _mm256_add_ps(_mm256_mul_ps(ex, ex), _mm256_mul_ps(ey, ey));
-        float* at = row + (x - x0_);
-        _mm256_storeu_ps(at, _mm256_min_ps(_mm256_loadu_ps(at), d2));
-      }
-#else
-      for (int x = xa; x <= xb; ++x) {
-        const float wx = float(x) - s.ax;
-        const float t = std::clamp((wx * dx + along) * inverse, 0.0f, 1.0f);
-        const float ex = wx - t * dx, ey = wy - t * dy;
-        row[x - x0_] = std::min(row[x - x0_], ex * ex + ey * ey);
-      }
-#endif
-    }
-  }
-
-  float band_;
-  int x0_, y0_, x1_, y1_;
-  std::size_t stride_;
-  std::vector<float> squared_;
-};
-
 /// Whether the bilinear surface through the pixels' centres is above the level at a point of the picture.
 bool inside(const Image& mask, const Eigen::Vector2d& px) {
   const double x = std::clamp(px.x() - 0.5, 0.0, mask.width() - 1.0);
@@ -188,30 +138,28 @@ bool inside(const Image& mask, const Eigen::Vector2d& px) {
   return top + fy * (bottom - top) > 127.5;
 }
 
-std::uint8_t state_of_cell(const Tile& tile, int x, int y) {
-  const std::int16_t* s = &tile.samples[std::size_t(y) * kTileSamples + x];
-  const std::int16_t v[4] = {s[0], s[1], s[kTileSamples], s[kTileSamples + 1]};
-  const auto all = [&](std::int16_t q) { return v[0] == q && v[1] == q && v[2] == q && v[3] == q; };
-  if (v[0] == kUnseen || v[1] == kUnseen || v[2] == kUnseen || v[3] == kUnseen) return kNotSeen;
-  if (all(-kDeep)) return kDeepInside;
-  if (all(kDeep)) return kDeepOutside;
-  return kBand;
-}
-
 /// Fills the tile's cell states from its samples; returns their union.
 std::uint8_t classify(Tile& tile) {
-  tile.deep_inside = tile.deep_outside = tile.not_seen = 0;
-  std::uint8_t bits = 0;
-  for (int y = 0; y < kTile; ++y)
-    for (int x = 0; x < kTile; ++x) {
-      const std::uint8_t state = state_of_cell(tile, x, y);
-      const std::uint64_t bit = std::uint64_t(1) << (8 * y + x);
-      if (state == kDeepInside) tile.deep_inside |= bit;
-      if (state == kDeepOutside) tile.deep_outside |= bit;
-      if (state == kNotSeen) tile.not_seen |= bit;
-      bits |= state;
+  // Bit x of each row: what sample x is.
+  unsigned in[kTileSamples] = {}, out[kTileSamples] = {}, unseen[kTileSamples] = {};
+  for (int y = 0; y < kTileSamples; ++y)
+    for (int x = 0; x < kTileSamples; ++x) {
+      const std::int16_t s = tile.samples[std::size_t(y) * kTileSamples + x];
+      in[y] |= unsigned(s == -kDeep) << x;
+      out[y] |= unsigned(s == kDeep) << x;
+      unseen[y] |= unsigned(s == kUnseen) << x;
     }
-  return bits;
+  tile.deep_inside = tile.deep_outside = tile.not_seen = 0;
+  for (int y = 0; y < kTile; ++y) {
+    const auto all_four = [&](const unsigned* rows) { return std::uint64_t(rows[y] & rows[y + 1]); };
+    const std::uint64_t a = all_four(in), b = all_four(out), c = unseen[y] | unseen[y + 1];
+    tile.deep_inside |= (a & a >> 1 & 0xFF) << (8 * y);
+    tile.deep_outside |= (b & b >> 1 & 0xFF) << (8 * y);
+    tile.not_seen |= ((c | c >> 1) & 0xFF) << (8 * y);
+  }
+  const std::uint64_t band = ~(tile.deep_inside | tile.deep_outside | tile.not_seen);
+  return std::uint8_t((tile.deep_inside ? kDeepInside : 0) | (tile.deep_outside ? kDeepOutside : 0) |
+                      (tile.not_seen ? kNotSeen : 0) | (band ? kBand : 0));
 }
 
 void build_pyramid(Silhouette::Data& data, std::vector<std::uint8_t> states) {
@@ -285,11 +233,15 @@ Silhouette SilhouetteMaker::make(const Image& mask, double band_px) const {
 
   const BitMask bits(mask);
   std::vector<Segment> segments;
+  bool cut_off = false;
   const auto in_domain = [&](const Eigen::Vector2d& px) {
     return !frame.lens || frame.camera.distorted_from_pixel(px).squaredNorm() < frame.domain2;
   };
   const std::function<void(double, double, double, double)> emit = [&](double ax, double ay, double bx, double by) {
-    if (!in_domain({ax, ay}) || !in_domain({bx, by})) return;
+    if (!in_domain({ax, ay}) || !in_domain({bx, by})) {
+      cut_off = true;
+      return;
+    }
     const Eigen::Vector2d a = frame.field_from_pixel({ax, ay}), b = frame.field_from_pixel({bx, by});
     segments.push_back({float(a.x()), float(a.y()), float(b.x()), float(b.y())});
   };
@@ -313,8 +265,7 @@ Silhouette SilhouetteMaker::make(const Image& mask, double band_px) const {
     for (int ty = ty0; ty <= ty1; ++ty)
       for (int tx = tx0; tx <= tx1; ++tx) near[std::size_t(ty) * data->tiles_x + tx] = 1;
   }
-  std::optional<DistanceBand> distances;
-  if (!segments.empty()) distances.emplace(segments, band, samples_x, samples_y);
+  const DistanceBand distances(segments, band, samples_x, samples_y);
 
   for (const std::int16_t constant : {std::int16_t(-kDeep), kDeep, kUnseen}) {
     Tile tile{};
@@ -322,37 +273,51 @@ Silhouette SilhouetteMaker::make(const Image& mask, double band_px) const {
     classify(tile);
     data->tiles.push_back(tile);
   }
+  const auto make_tile = [&](int tx, int ty) {
+    const std::size_t t = std::size_t(ty) * data->tiles_x + tx;
+    const bool all_seen = frame.seen[t] == Frame::Seen::all;
+    const std::optional<bool> side =
+        all_seen ? bits.uniform(frame.pixels_of_tile(tx, ty), mask.width(), mask.height()) : std::nullopt;
+    Tile tile{};
+    for (int y = 0; y < kTileSamples; ++y)
+      for (int x = 0; x < kTileSamples; ++x) {
+        const int i = tx * kTile + x, j = ty * kTile + y;
+        std::int16_t& sample = tile.samples[std::size_t(y) * kTileSamples + x];
+        int magnitude = kDeep;
+        if (near[t])
+          if (const float d2 = distances.at(i, j); d2 < band * band)
+            magnitude = std::min(int(std::sqrt(d2) * (kDeep / band) + 0.5f), kDeep - 1);
+        if (side) {
+          sample = std::int16_t(*side ? -magnitude : magnitude);
+          continue;
+        }
+        const Eigen::Vector2d px = frame.pixel_of_sample(i, j);
+        sample = !all_seen && !frame.sees(px) ? kUnseen : std::int16_t(inside(mask, px) ? -magnitude : magnitude);
+      }
+    return tile;
+  };
   data->directory.resize(near.size());
   std::vector<std::uint8_t> states(near.size());
-  for (int ty = 0; ty < data->tiles_y; ++ty)
+  for (int ty = 0; ty < data->tiles_y; ++ty) {
+    // Tiles side by side without contour are on one side of it; where the lens has cut the contour off, who knows.
+    std::int32_t beside = kUnseenTile;
     for (int tx = 0; tx < data->tiles_x; ++tx) {
       const std::size_t t = std::size_t(ty) * data->tiles_x + tx;
       if (frame.seen[t] == Frame::Seen::none) {
-        data->directory[t] = kUnseenTile;
+        data->directory[t] = beside = kUnseenTile;
         states[t] = kNotSeen;
         continue;
       }
       if (!near[t] && frame.seen[t] == Frame::Seen::all) {
-        const bool in = inside(mask, frame.pixel_of_sample(tx * kTile + kTile / 2, ty * kTile + kTile / 2));
-        data->directory[t] = in ? kInsideTile : kOutsideTile;
-        states[t] = in ? kDeepInside : kDeepOutside;
+        if (beside == kUnseenTile || cut_off)
+          beside = inside(mask, frame.pixel_of_sample(tx * kTile + kTile / 2, ty * kTile + kTile / 2)) ? kInsideTile
+                                                                                                       : kOutsideTile;
+        data->directory[t] = beside;
+        states[t] = beside == kInsideTile ? kDeepInside : kDeepOutside;
         continue;
       }
-      Tile tile{};
-      for (int y = 0; y < kTileSamples; ++y)
-        for (int x = 0; x < kTileSamples; ++x) {
-          const int i = tx * kTile + x, j = ty * kTile + y;
-          std::int16_t& sample = tile.samples[std::size_t(y) * kTileSamples + x];
-          const Eigen::Vector2d px = frame.pixel_of_sample(i, j);
-          if (frame.seen[t] != Frame::Seen::all && !frame.sees(px)) {
-            sample = kUnseen;
-            continue;
-          }
-          const float d2 = near[t] ? distances->at(i, j) : std::numeric_limits<float>::max();
-          const int magnitude =
-              d2 < band * band ? std::min(int(std::lround(std::sqrt(d2) * (kDeep / band))), kDeep - 1) : kDeep;
-          sample = std::int16_t(inside(mask, px) ? -magnitude : magnitude);
-        }
+      beside = kUnseenTile;
+      Tile tile = make_tile(tx, ty);
       states[t] = classify(tile);
       if (states[t] == kDeepInside || states[t] == kDeepOutside || states[t] == kNotSeen) {
         data->directory[t] = states[t] == kDeepInside    ? kInsideTile
@@ -363,6 +328,7 @@ Silhouette SilhouetteMaker::make(const Image& mask, double band_px) const {
         data->tiles.push_back(tile);
       }
     }
+  }
   data->tiles.shrink_to_fit();
   build_pyramid(*data, std::move(states));
   return Silhouette(std::move(data));

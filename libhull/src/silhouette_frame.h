@@ -4,6 +4,7 @@
 
 #include <lumihull/hull/silhouette.h>
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <vector>
 
@@ -34,6 +35,16 @@ struct SilhouetteMaker::Frame {
     };
     if (fy == 0) return mix(p[0], p[1], fx);
     return mix(mix(p[0], p[1], fx), mix(p[table_x], p[table_x + 1], fx), fy);
+  }
+
+  /// The box around a tile's samples in the picture. NaN where one of them lies beyond the lens's domain.
+  Eigen::AlignedBox2d pixels_of_tile(int tx, int ty) const {
+    // The map is affine without a lens, and bilinear between the table's nodes.
+    const int step = lens ? stride : kTile;
+    Eigen::AlignedBox2d box;
+    for (int y = 0; y <= kTile; y += step)
+      for (int x = 0; x <= kTile; x += step) box.extend(pixel_of_sample(tx * kTile + x, ty * kTile + y));
+    return box;
   }
 
   bool sees(const Eigen::Vector2d& px) const {

@@ -12,8 +12,9 @@
 namespace lumihull::hull {
 
 struct SilhouetteOptions {
-  /// Side of a cell of the field, in pixels (of the axis that has more of them a radian); 1 … 64, whole numbers share
-  /// the lens's tables. A quarter of a voxel's footprint is fine enough: see `silhouette_options`.
+  /// Side of a cell of the field, in pixels (of the axis that has more of them a radian); 1 … 64; photographs of
+  /// one camera and one cell share the lens's tables. A quarter of a voxel's footprint is fine enough: see
+  /// `silhouette_options`.
   double cell_px = 1;
   /// Distances are exact up to here and clamped beyond, in pixels; at least two cells are taken. The surface is placed
   /// well where it is 1.75 voxels or more.
