@@ -121,12 +121,27 @@ int main() {
 
   const Image silhouette = mask();
   std::string png;
-  const double fast = cpu_seconds([&] { png = encode_png(silhouette, {.compression = 1, .filter = false}); });
-  std::printf("mask as PNG, level 1, no filter: %.2f ms, %zu bytes\n", 1e3 * fast, png.size());
-  const double usual = cpu_seconds([&] { png = encode_png(silhouette); });
-  std::printf("mask as PNG, level 4, filtered:  %.2f ms, %zu bytes\n", 1e3 * usual, png.size());
-  const std::string small = encode_png(silhouette, {.compression = 1, .filter = false});
-  std::printf("mask read: %.2f ms\n",
-              1e3 * cpu_seconds([&] { ours = decode_image(std::as_bytes(std::span(small)), "m"); }));
+  const double own = cpu_seconds([&] { png = encode_mask(silhouette); });
+  std::vector<unsigned char> encoded;
+  const cv::Mat gray(silhouette.height(), silhouette.width(), CV_8UC1, const_cast<std::byte*>(silhouette.data()));
+  const auto opencv = [&](int strategy) {
+    const double seconds = cpu_seconds([&] {
+      cv::imencode(".png", gray, encoded, {cv::IMWRITE_PNG_COMPRESSION, 1, cv::IMWRITE_PNG_STRATEGY, strategy});
+    });
+    std::printf("mask, cv::imencode level 1, strategy %d: %.2f ms, %zu bytes, %.1f x ours\n", strategy, 1e3 * seconds,
+                encoded.size(), seconds / own);
+  };
+  std::printf("mask, lumihull::encode_mask: %.2f ms, %zu bytes\n", 1e3 * own, png.size());
+  opencv(cv::IMWRITE_PNG_STRATEGY_DEFAULT);
+  opencv(cv::IMWRITE_PNG_STRATEGY_RLE);
+  std::string plain;
+  const double usual = cpu_seconds([&] { plain = encode_png(silhouette); });
+  std::printf("mask, lumihull::encode_png: %.2f ms, %zu bytes, %.1f x ours\n", 1e3 * usual, plain.size(), usual / own);
+  const double read = cpu_seconds([&] { ours = decode_image(std::as_bytes(std::span(png)), "m"); });
+  std::printf("mask read, lumihull::decode_image: %.2f ms; %s\n", 1e3 * read,
+              std::memcmp(ours.data(), silhouette.data(), silhouette.bytes()) == 0 ? "the same" : "NOT THE SAME");
+  const std::vector<char> ours_png(png.begin(), png.end());
+  const double peer_read = cpu_seconds([&] { mat = cv::imdecode(ours_png, cv::IMREAD_GRAYSCALE); });
+  std::printf("mask read, cv::imdecode: %.2f ms, %.1f x ours\n", 1e3 * peer_read, peer_read / read);
   std::filesystem::remove(file);
 }

@@ -129,7 +129,7 @@ std::vector<std::string> take(const Session& session, const Scene& scene, const 
           tags.height = session.camera.height;
           write_file(folder / files[i], with_exif(encode_jpeg(photo.picture, o.jpeg_quality), tags));
         }
-        if (!masks.empty() && o.truth_masks) write_png(masks / (name + ".png"), photo.mask, {1, false});
+        if (!masks.empty() && o.truth_masks) write_file(masks / (name + ".png"), encode_mask(photo.mask));
       },
       true);
   job.end();

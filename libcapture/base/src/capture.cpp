@@ -173,7 +173,7 @@ void Capture::write_mask(std::size_t i, const Image& mask, MaskSource source) {
       mask.height() != camera.height)
     throw Error(ErrorCode::invalid_argument, "a mask is 8-bit, one channel, of its photograph's size", shot.name);
   internal::make_folder(folder_ / "masks");
-  const std::string png = encode_png(mask, {.compression = 1, .filter = false});
+  const std::string png = encode_mask(mask);
   const std::string digest = sha256(png);
   append_line(mask_journal(folder_),
               (source == MaskSource::imported ? "imported " : "keyed ") + digest + " " + shot.name + "\n");

@@ -97,6 +97,9 @@ bool read_pixels(Decoder* d, png_bytepp rows) {
 bool is_png(Bytes start) { return start.size() >= 8 && std::memcmp(start.data(), "\x89PNG\r\n\x1a\n", 8) == 0; }
 
 Image decode_png(Bytes bytes, const std::string& name, int channels) {
+  // Masks of our own; whatever is unusual or damaged is left to libpng.
+  if (channels <= 1)
+    if (Image grey = decode_plain_grey_png(bytes); !grey.empty()) return grey;
   Decoder d;
   std::memset(&d, 0, sizeof d);
   d.bytes = bytes.data();
@@ -175,7 +178,7 @@ void on_write(png_structp png, png_bytep bytes, png_size_t count) {
 }
 void on_flush(png_structp) {}
 
-bool encode(Encoder* e, png_bytepp rows, int width, int height, int channels, int depth, int level, bool filter) {
+bool encode(Encoder* e, png_bytepp rows, int width, int height, int channels, int depth, int level) {
   if (setjmp(e->failure.jump)) return false;
   e->png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &e->failure, on_error, on_warning);
   if (!e->png) return false;
@@ -184,7 +187,7 @@ bool encode(Encoder* e, png_bytepp rows, int width, int height, int channels, in
   png_set_write_fn(e->png, e, on_write, on_flush);
   png_set_compression_level(e->png, level);
   png_set_compression_buffer_size(e->png, 1 << 18);
-  png_set_filter(e->png, PNG_FILTER_TYPE_BASE, filter ? PNG_ALL_FILTERS : PNG_FILTER_NONE);
+  png_set_filter(e->png, PNG_FILTER_TYPE_BASE, PNG_ALL_FILTERS);
   png_set_IHDR(e->png, e->info, png_uint_32(width), png_uint_32(height), depth,
                channels == 1   ? PNG_COLOR_TYPE_GRAY
                : channels == 3 ? PNG_COLOR_TYPE_RGB
@@ -220,7 +223,7 @@ std::string encode_png(const Image& image, const PngOptions& options) {
     }
   } release{e};
   if (!encode(&e, rows.data(), image.width(), image.height(), image.channels(), int(size_of(image.type()) * 8),
-              options.compression, options.filter))
+              options.compression))
     throw Error(ErrorCode::internal, std::string("PNG encoder: ") + e.failure.message);
   return out;
 }
