@@ -335,6 +335,15 @@ TEST(Region, IsFoundForFewPhotographs) {
     EXPECT_GT(box.max.minCoeff(), 0.8);
     EXPECT_LT(box.size().maxCoeff(), 6);
   }
+  // Two from above whose cones go on together for ever, and one from the side that ends them in its picture only.
+  std::vector<View> views;
+  for (const Eigen::Vector3d& eye : {Eigen::Vector3d(0.3, 0, 4), {-0.3, 0, 4}, {0, 4, 0.2}})
+    views.push_back({test::pinhole(60, 60, 75), look_at(eye, {0, 0, 0}, {0.1, 1, 1})});
+  Job job;
+  const Box box = find_region(views, test::silhouettes_of(object, views), {}, {}, job);
+  EXPECT_LT(box.size().maxCoeff(), 6);
+  EXPECT_LT(box.min.maxCoeff(), -0.8);
+  EXPECT_GT(box.max.minCoeff(), 0.8);
 }
 
 TEST(Region, IsFoundWhereMostMasksAreEmpty) {
