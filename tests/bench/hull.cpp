@@ -8,6 +8,7 @@
 #include <lumihull/base/parallel.h>
 #include <lumihull/hull/carve.h>
 #include <lumihull/hull/mesh_check.h>
+#include <lumihull/hull/ray_scene.h>
 #include <lumihull/hull/region.h>
 #include <open3d/camera/PinholeCameraParameters.h>
 #include <open3d/geometry/Image.h>
@@ -67,6 +68,40 @@ double open3d_seconds(const std::vector<View>& views, const std::vector<Image>& 
   return timer.cpu_s() / double(sample);
 }
 
+/// Mean over some of the views of what the mesh's silhouettes and the true masks share: by coverage, sum of the lesser
+/// over sum of the greater, and thresholded at one half.
+struct Iou {
+  double coverage = 0, thresholded = 0, lowest = 1;  ///< lowest: coverage, of a single view
+};
+
+Iou silhouette_iou(const hull::Mesh& mesh, const std::vector<View>& views, const std::vector<Image>& masks, Job& job) {
+  constexpr std::size_t kViews = 12;
+  const hull::RayScene scene(mesh);
+  const test::Shape shape = [&](const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
+    return scene.occluded({origin.cast<float>(), direction.cast<float>()});
+  };
+  std::vector<Iou> of(std::min(kViews, views.size()));
+  parallel_for(job, of.size(), [&](std::size_t k) {
+    const std::size_t i = k * views.size() / of.size();
+    const Image rendered = test::mask_of(shape, views[i]);
+    double least = 0, most = 0, both = 0, either = 0;
+    for (int y = 0; y < rendered.height(); ++y)
+      for (int x = 0; x < rendered.width(); ++x) {
+        const int a = rendered.row<std::uint8_t>(y)[x], b = masks[i].row<std::uint8_t>(y)[x];
+        least += std::min(a, b), most += std::max(a, b);
+        both += a >= 128 && b >= 128, either += a >= 128 || b >= 128;
+      }
+    of[k] = {least / most, both / either, least / most};
+  });
+  Iou mean;
+  for (const Iou& one : of) {
+    mean.coverage += one.coverage / double(of.size());
+    mean.thresholded += one.thresholded / double(of.size());
+    mean.lowest = std::min(mean.lowest, one.lowest);
+  }
+  return mean;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -118,6 +153,10 @@ int main(int argc, char** argv) {
                 check.good() ? "good" : "NOT good", check.volume);
     if (check.self_intersections) std::printf(", %zu self-intersections", *check.self_intersections);
     std::printf("\n");
+
+    const Iou iou = silhouette_iou(result.mesh, views, masks, job);
+    std::printf("  silhouettes' IoU with the true masks: %.4f by coverage (lowest %.4f), %.4f thresholded\n",
+                iou.coverage, iou.lowest, iou.thresholded);
 
     // Brute force: all views at every sample, on a sample of the slabs.
     const hull::HullFunction function(views, silhouettes);
