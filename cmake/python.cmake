@@ -18,7 +18,6 @@ function(lumihull_python_module folder)
   set(package ${CMAKE_BINARY_DIR}/python/lumihull)
   pybind11_add_module(lumihull_python MODULE NO_EXTRAS ${arg_SOURCES})
   target_compile_definitions(lumihull_python PRIVATE LUMIHULL_VERSION="${PROJECT_VERSION}")
-  target_include_directories(lumihull_python PRIVATE capi/src)  # capture_renderer.h
   file(RELATIVE_PATH libraries /${LUMIHULL_PYTHON_DIR}/lumihull /${CMAKE_INSTALL_LIBDIR})
   set_target_properties(lumihull_python PROPERTIES OUTPUT_NAME _lumihull LIBRARY_OUTPUT_DIRECTORY ${package}
     INSTALL_RPATH "$ORIGIN/${libraries}")

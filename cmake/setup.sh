@@ -1,4 +1,4 @@
-# Sourced by ./demo, ./test and ./bench: says what it does, installs the packages that are missing.
+# Sourced by ./demo and ./test: says what it does, installs the packages that are missing.
 # shellcheck shell=bash
 
 started=$SECONDS

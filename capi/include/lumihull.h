@@ -387,7 +387,8 @@ LH_API lh_status lh_capture_get_camera(lh_context *ctx, const lh_capture *captur
 LH_API lh_status lh_capture_set_camera(lh_context *ctx, lh_capture *capture, size_t index, const lh_camera *camera);
 
 /** Adds a photograph, not positioned; its index is the old lh_capture_shot_count. file: relative to the capture's
- * folder, or absolute; it is not copied. @return LH_EINVAL: name in use or no plain file name, no such camera */
+ * folder, or absolute; it is not copied. name: 1 … 200 bytes, no '/' and no control characters.
+ * @return LH_EINVAL: name in use or no plain file name, no such camera; LH_ENOTFOUND: no such file */
 LH_API lh_status lh_capture_add_shot(lh_context *ctx, lh_capture *capture, const char *name, const char *file,
                                      size_t camera);
 /** The shot's unique name. */

@@ -1,6 +1,5 @@
 #include <lumihull/base/capture.h>
-
-#include <algorithm>
+#include <lumihull/slf/results.h>
 
 #include "arguments.h"
 #include "context.h"
@@ -18,14 +17,6 @@ template <class Handle>
 auto& shot_of(Handle* capture, size_t shot) {
   auto& shots = given(capture, "capture").value.shots;
   return shots[index(shot, shots.size(), "shot")];
-}
-
-/// Names become file names, and are stored in JSON.
-std::string shot_name(const char* name) {
-  const std::string n = text(name, "name");
-  if (n.empty() || n.size() > 200 || n == "." || n == ".." || n.find('/') != std::string::npos)
-    invalid("expected 1 to 200 bytes without '/', not \".\" or \"..\"", "name");
-  return n;
 }
 
 }  // namespace
@@ -78,15 +69,8 @@ lh_status lh_capture_set_camera(lh_context* ctx, lh_capture* capture, size_t i, 
 lh_status lh_capture_add_shot(lh_context* ctx, lh_capture* capture, const char* name, const char* file, size_t camera) {
   return guarded(ctx, [&] {
     Capture& c = given(capture, "capture").value;
-    Shot shot;
-    shot.name = shot_name(name);
-    shot.file = path(file, "file");
-    shot.camera = int(index(camera, c.cameras.size(), "camera"));
-    if (std::any_of(c.shots.begin(), c.shots.end(), [&](const Shot& s) { return s.name == shot.name; }))
-      invalid("expected a name that no other shot has, found \"" + shot.name + "\"", "name");
     if (c.shots.size() >= kMaxEntries) invalid("a capture has at most 100,000 shots", "capture");
-    shot.stamp = Capture::stamp(c.photo_path(shot));
-    c.shots.push_back(std::move(shot));
+    c.add_shot(text(name, "name"), path(file, "file"), camera);
   });
 }
 
@@ -171,9 +155,6 @@ lh_status lh_capture_write_mask(lh_context* ctx, lh_capture* capture, size_t sho
 lh_status lh_capture_read_hull(lh_context* ctx, const lh_capture* capture, lh_mesh** out) {
   return guarded(ctx, [&] {
     given(out, "out");
-    const auto file = given(capture, "capture").value.hull_path();
-    if (!std::filesystem::exists(file))
-      throw Error(ErrorCode::not_found, "there is no hull yet; run the stage \"hull\" first", file.native());
-    give(out, hull::read_mesh(file));
+    give(out, slf::read_hull(given(capture, "capture").value));
   });
 }

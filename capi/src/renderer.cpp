@@ -1,5 +1,8 @@
+#include <lumihull/slf/capture_renderer.h>
+
+#include <numbers>
+
 #include "arguments.h"
-#include "capture_renderer.h"
 #include "context.h"
 #include "handles.h"
 
@@ -7,7 +10,7 @@ using namespace lumihull;
 using namespace lumihull::capi;
 
 struct lh_renderer {
-  CaptureRenderer value;
+  slf::CaptureRenderer value;
 };
 
 lh_status lh_renderer_create(lh_context* ctx, const lh_capture* capture, const char* method, lh_renderer** out) {
@@ -23,7 +26,7 @@ lh_status lh_renderer_render(lh_context* ctx, lh_renderer* renderer, const lh_ca
                              const double cam_from_world[12], int32_t rays, uint8_t* rgba, size_t rgba_size,
                              float* depth) {
   return guarded(ctx, [&](Job& job) {
-    CaptureRenderer& r = given(renderer, "renderer").value;
+    slf::CaptureRenderer& r = given(renderer, "renderer").value;
     const View view{camera_from(camera, "camera"), pose_from(cam_from_world, "cam_from_world")};
     given(rgba, "rgba");
     const size_t size = size_t(view.camera.width) * size_t(view.camera.height) * 4;
@@ -41,10 +44,13 @@ lh_status lh_renderer_render(lh_context* ctx, lh_renderer* renderer, const lh_ca
 lh_status lh_renderer_turntable(lh_context* ctx, const lh_renderer* renderer, size_t frames, int32_t width,
                                 int32_t height, double elevation_rad, lh_camera* camera, double* cam_from_world) {
   return guarded(ctx, [&] {
-    const CaptureRenderer& r = given(renderer, "renderer").value;
+    const slf::CaptureRenderer& r = given(renderer, "renderer").value;
     if (frames < 1 || frames > 100'000) invalid("expected 1 to 100,000, found " + std::to_string(frames), "frames");
     array(cam_from_world, frames, 12, "cam_from_world");
-    const auto path = r.turntable(int(frames), width, height, elevation_rad);
+    const auto path = r.turntable({.frames = int(frames),
+                                   .elevation_deg = elevation_rad * 180 / std::numbers::pi,
+                                   .width = width,
+                                   .height = height});
     write_struct(camera, camera_to(path.front().view.camera), "camera");
     for (size_t i = 0; i < frames; ++i) pose_to(path[i].view.cam_from_world, cam_from_world + 12 * i);
   });

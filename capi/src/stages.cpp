@@ -1,5 +1,5 @@
-#include <lumihull/base/files.h>
 #include <lumihull/slf/pipeline.h>
+#include <lumihull/slf/results.h>
 
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -88,10 +88,5 @@ lh_status lh_capture_run(lh_context* ctx, lh_capture* capture, int32_t force, lh
 }
 
 lh_status lh_capture_evaluation(lh_context* ctx, const lh_capture* capture, char* buffer, size_t size, size_t* needed) {
-  return guarded(ctx, [&] {
-    const auto file = given(capture, "capture").value.folder() / "evaluate" / "evaluation.json";
-    if (!std::filesystem::exists(file))
-      throw Error(ErrorCode::not_found, "there is no evaluation yet; run the stage \"evaluate\" first", file.native());
-    give_text(read_file(file), buffer, size, needed);
-  });
+  return guarded(ctx, [&] { give_text(slf::read_evaluation(given(capture, "capture").value), buffer, size, needed); });
 }

@@ -239,6 +239,7 @@ static void capture(lh_context *ctx, const char *scratch) {
   EXPECT(ctx, LH_EINVAL, lh_capture_get_camera(ctx, capture, 1, &got));
   EXPECT(ctx, LH_EINVAL, lh_capture_add_shot(ctx, capture, "a/b", "photo.png", 0));
   CHECK_SAYS(ctx, "name");
+  EXPECT(ctx, LH_EINVAL, lh_capture_add_shot(ctx, capture, "caf\xe9", "photo.png", 0)); /* not UTF-8 */
   EXPECT(ctx, LH_EINVAL, lh_capture_add_shot(ctx, capture, "a", "photo.png", 1));
   EXPECT(ctx, LH_ENOTFOUND, lh_capture_add_shot(ctx, capture, "a", "photo.png", 0));
   CHECK_SAYS(ctx, "photo.png");

@@ -1,4 +1,4 @@
-# cmake -DBUILD=… -DSOURCE=… -DWORK=… -DCC=… -DCXX=… -DFLAGS=… -DPHOTOS=… [-DPYTHON=… -DPYTHON_DIR=…] -P run.cmake:
+# cmake -DBUILD=… -DSOURCE=… -DWORK=… -DCC=… -DCXX=… -DPHOTOS=… [-DPYTHON=… -DPYTHON_DIR=…] -P run.cmake:
 # installs the build into a new prefix, moves it, and uses it from outside: CMake's package, pkg-config, Python, and the
 # three example programs, which make a model of the rig's photographs.
 function(step text)
@@ -14,8 +14,7 @@ file(GLOB_RECURSE pc ${WORK}/prefix/*/lumihull.pc)
 cmake_path(GET pc PARENT_PATH pc_folder)
 
 step("configure" ${CMAKE_COMMAND} -G Ninja -S ${CMAKE_CURRENT_LIST_DIR} -B ${WORK}/build -DCMAKE_PREFIX_PATH=${WORK}/prefix
-  -DCMAKE_C_COMPILER=${CC} -DCMAKE_CXX_COMPILER=${CXX} "-DCMAKE_CXX_FLAGS=${FLAGS}" "-DCMAKE_C_FLAGS=${FLAGS}"
-  -DEXAMPLES=${SOURCE}/examples)
+  -DCMAKE_C_COMPILER=${CC} -DCMAKE_CXX_COMPILER=${CXX} -DEXAMPLES=${SOURCE}/examples)
 step("build" ${CMAKE_COMMAND} --build ${WORK}/build -j 2)
 step("C++ program" ${WORK}/build/consumer_cpp)
 step("C program" ${WORK}/build/consumer_c)
@@ -24,7 +23,7 @@ set(ENV{PKG_CONFIG_PATH} ${pc_folder})
 find_program(pkg_config pkg-config)
 if(pkg_config)
   execute_process(COMMAND ${pkg_config} --cflags --libs lumihull OUTPUT_VARIABLE flags COMMAND_ERROR_IS_FATAL ANY)
-  separate_arguments(flags UNIX_COMMAND "${flags} ${FLAGS}")
+  separate_arguments(flags UNIX_COMMAND "${flags}")
   step("pkg-config" ${CC} -o ${WORK}/by_pkg_config ${CMAKE_CURRENT_LIST_DIR}/main.c ${flags})
   execute_process(COMMAND ${pkg_config} --variable=libdir lumihull OUTPUT_VARIABLE libdir OUTPUT_STRIP_TRAILING_WHITESPACE)
   step("program by pkg-config" ${CMAKE_COMMAND} -E env LD_LIBRARY_PATH=${libdir} ${WORK}/by_pkg_config)

@@ -103,8 +103,10 @@ def test_a_capture_of_ones_own(tmp_path: Path) -> None:
     assert again.names == ["a"] and again.unit_known and again.cameras[0].f == 15
     assert again.file(0) == tmp_path / "own" / "a.png"
     assert np.array_equal(again.read_photo(0).array, photo)
-    with pytest.raises(lumihull.Error):
-        again.add_shot("a", "a.png", 0)
+    for name in ("a", "b/c", "b\0c", "b\nc", ""):
+        with pytest.raises(lumihull.Error) as caught:
+            again.add_shot(name, "a.png", 0)
+        assert caught.value.code == "invalid_argument"
 
 
 def test_exchange(finished: lumihull.Capture, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -89,3 +90,27 @@ except KeyboardInterrupt:
     child.send_signal(signal.SIGINT)
     out, _ = child.communicate(timeout=60)
     assert out == "interrupted\n"
+
+
+def test_a_capture_in_use_is_refused_to_others(own_copy: lumihull.Capture) -> None:
+    """A call that lets go of the GIL would race with them."""
+    caught: list[lumihull.Error] = []
+
+    def meddle(progress: lumihull.Progress) -> None:
+        for call in (own_copy.describe, own_copy.save, lambda: own_copy.set_pose(1, None), lambda: own_copy.names):
+            with pytest.raises(lumihull.Error) as error:
+                call()
+            caught.append(error.value)
+
+    own_copy.run_stage("hull", force=True, progress=meddle)
+    assert caught and all(e.code == "invalid_argument" for e in caught)
+    assert own_copy.describe()["photos"] == 24  # free again
+    with pytest.raises(lumihull.Error):
+        own_copy.run_stage("nonsense")
+    assert len(own_copy.names) == 24  # after a failure, too
+
+
+def test_many_threads_read_one_capture(finished: lumihull.Capture) -> None:
+    with ThreadPoolExecutor(4) as pool:
+        photos = list(pool.map(finished.read_photo, range(24)))
+    assert all(np.array_equal(photos[i].array, finished.read_photo(i).array) for i in (0, 23))

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <new>
 
 #include "bindings.h"
 
@@ -216,6 +217,7 @@ Image image_from(const py::array& any) {
   if (!u8 && !u16 && !py::isinstance<py::array_t<float>>(any))
     invalid("expected uint8, uint16 or float32, found " + py::str(any.dtype()).cast<std::string>(), "array");
   const auto array = py::array::ensure(any, py::array::c_style);
+  if (!array) throw std::bad_alloc();
   const py::ssize_t channels = any.ndim() == 3 ? any.shape(2) : 1;
   if ((any.ndim() != 2 && any.ndim() != 3) || (channels != 1 && channels != 3 && channels != 4) ||
       any.shape(0) > kMaxImageSide || any.shape(1) > kMaxImageSide)

@@ -12,6 +12,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 namespace lumihull::python {
@@ -37,6 +38,34 @@ std::size_t rows(const Array<T>& array, py::ssize_t columns, const char* name) {
   if (array.ndim() != 2 || array.shape(1) != columns)
     invalid("expected an array of shape (n, " + std::to_string(columns) + ")", name);
   return std::size_t(array.shape(0));
+}
+
+/// Says, while it lives, that a Capture or a Renderer is in use, for a call that lets go of the GIL leaves it to other
+/// threads, and to callbacks. Many may read at once, but who changes it must be alone: else Error{invalid_argument}.
+/// Made and destroyed with the GIL.
+class InUse {
+ public:
+  InUse(const void* object, bool alone);
+  InUse(const InUse&) = delete;
+  InUse& operator=(const InUse&) = delete;
+  ~InUse();
+
+ private:
+  const void* object_;
+  bool alone_;
+};
+
+/// The method self -> f(self, …) with `self` in use: by a reader where f takes it as const.
+template <class F, class R, class Self, class... Arguments>
+auto guarded_as(F f, R (F::*)(Self&, Arguments...) const) {
+  return [f](Self& self, Arguments... arguments) -> R {
+    const InUse in_use(&self, !std::is_const_v<Self>);
+    return f(self, std::forward<Arguments>(arguments)...);
+  };
+}
+template <class F>
+auto guarded(F f) {
+  return guarded_as(f, &F::operator());
 }
 
 /// Runs body(Job&) on a thread of its own, without the GIL, while the calling thread waits and, every 50 ms and with

@@ -1,13 +1,10 @@
 #include <lumihull/base/capture.h>
 #include <lumihull/base/export.h>
-#include <lumihull/base/files.h>
 #include <lumihull/base/import.h>
-#include <lumihull/hull/mesh.h>
 #include <lumihull/slf/pipeline.h>
+#include <lumihull/slf/results.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
-
-#include <algorithm>
 
 #include "bindings.h"
 
@@ -28,108 +25,64 @@ std::size_t index(const Capture& capture, py::ssize_t i) {
 
 py::object json_loads(const std::string& text) { return py::module_::import("json").attr("loads")(text); }
 
-std::size_t add_shot(Capture& capture, const std::string& name, const std::string& file, std::size_t camera) {
-  if (name.empty() || name.size() > 200 || name == "." || name == ".." || name.find('/') != std::string::npos)
-    invalid("expected 1 to 200 bytes without '/', not \".\" or \"..\"", "name");
-  if (camera >= capture.cameras.size())
-    invalid("expected less than " + std::to_string(capture.cameras.size()), "camera");
-  if (std::any_of(capture.shots.begin(), capture.shots.end(), [&](const Shot& s) { return s.name == name; }))
-    invalid("expected a name that no other shot has, found \"" + name + "\"", "name");
-  Shot shot;
-  shot.name = name;
-  shot.file = file;
-  shot.camera = int(camera);
-  shot.stamp = Capture::stamp(capture.photo_path(shot));
-  capture.shots.push_back(std::move(shot));
-  return capture.shots.size() - 1;
-}
-
-hull::Mesh read_hull(const Capture& capture) {
-  if (!std::filesystem::exists(capture.hull_path()))
-    throw Error(ErrorCode::not_found, "there is no hull yet; run the stage \"hull\" first",
-                capture.hull_path().native());
-  return hull::read_mesh(capture.hull_path());
-}
-
-py::object read_evaluation(const Capture& capture) {
-  const auto file = capture.folder() / "evaluate" / "evaluation.json";
-  if (!std::filesystem::exists(file))
-    throw Error(ErrorCode::not_found, "there is no evaluation yet; run the stage \"evaluate\" first", file.native());
-  return json_loads(read_file(file));
-}
-
 void bind_shots(py::class_<Capture>& c) {
-  c.def("__len__", [](const Capture& self) { return self.shots.size(); })
-      .def_property_readonly("names",
-                             [](const Capture& self) {
+  c.def("__len__", guarded([](const Capture& self) { return self.shots.size(); }))
+      .def_property_readonly("names", guarded([](const Capture& self) {
                                std::vector<std::string> names;
                                for (const Shot& shot : self.shots) names.push_back(shot.name);
                                return names;
-                             })
-      .def(
-          "file", [](const Capture& self, py::ssize_t i) { return self.photo_path(self.shots[index(self, i)]); },
-          "shot"_a, "The photograph's path.")
-      .def(
-          "held_out", [](const Capture& self, py::ssize_t i) { return self.held_out(index(self, i)); }, "shot"_a)
-      .def(
-          "camera_index", [](const Capture& self, py::ssize_t i) { return self.shots[index(self, i)].camera; },
-          "shot"_a)
-      .def(
-          "pose", [](const Capture& self, py::ssize_t i) { return self.shots[index(self, i)].cam_from_world; },
-          "shot"_a, "cam_from_world, or None.")
-      .def(
-          "set_pose",
-          [](Capture& self, py::ssize_t i, const std::optional<Pose>& pose) {
-            self.shots[index(self, i)].cam_from_world = pose;
-          },
-          "shot"_a, "cam_from_world"_a)
-      .def(
-          "view", [](const Capture& self, py::ssize_t i) { return self.view(index(self, i)); }, "shot"_a)
-      .def(
-          "read_photo",
-          [](const Capture& self, py::ssize_t i) {
-            const std::size_t shot = index(self, i);
-            py::gil_scoped_release without_gil;
-            return self.read_photo(shot);
-          },
-          "shot"_a)
-      .def(
-          "read_mask",
-          [](const Capture& self, py::ssize_t i) {
-            const std::size_t shot = index(self, i);
-            py::gil_scoped_release without_gil;
-            return self.read_mask(shot);
-          },
-          "shot"_a)
-      .def(
-          "write_mask",
-          [](Capture& self, py::ssize_t i, const Image& mask) {
-            const std::size_t shot = index(self, i);
-            py::gil_scoped_release without_gil;
-            self.write_mask(shot, mask, MaskSource::imported);
-          },
-          "shot"_a, "mask"_a, "Stores a silhouette that keying then leaves alone.")
-      .def("add_shot", &add_shot, "name"_a, "file"_a, "camera"_a,
-           "Adds a photograph without a pose; returns its index.");
+                             }))
+      .def("file",
+           guarded([](const Capture& self, py::ssize_t i) { return self.photo_path(self.shots[index(self, i)]); }),
+           "shot"_a, "The photograph's path.")
+      .def("held_out", guarded([](const Capture& self, py::ssize_t i) { return self.held_out(index(self, i)); }),
+           "shot"_a)
+      .def("camera_index",
+           guarded([](const Capture& self, py::ssize_t i) { return self.shots[index(self, i)].camera; }), "shot"_a)
+      .def("pose",
+           guarded([](const Capture& self, py::ssize_t i) { return self.shots[index(self, i)].cam_from_world; }),
+           "shot"_a, "cam_from_world, or None.")
+      .def("set_pose", guarded([](Capture& self, py::ssize_t i, const std::optional<Pose>& pose) {
+             self.shots[index(self, i)].cam_from_world = pose;
+           }),
+           "shot"_a, "cam_from_world"_a)
+      .def("view", guarded([](const Capture& self, py::ssize_t i) { return self.view(index(self, i)); }), "shot"_a)
+      .def("read_photo", guarded([](const Capture& self, py::ssize_t i) {
+             const std::size_t shot = index(self, i);
+             py::gil_scoped_release without_gil;
+             return self.read_photo(shot);
+           }),
+           "shot"_a)
+      .def("read_mask", guarded([](const Capture& self, py::ssize_t i) {
+             const std::size_t shot = index(self, i);
+             py::gil_scoped_release without_gil;
+             return self.read_mask(shot);
+           }),
+           "shot"_a)
+      .def("write_mask", guarded([](Capture& self, py::ssize_t i, const Image& mask) {
+             const std::size_t shot = index(self, i);
+             py::gil_scoped_release without_gil;
+             self.write_mask(shot, mask, MaskSource::imported);
+           }),
+           "shot"_a, "mask"_a, "Stores a silhouette that keying then leaves alone.")
+      .def("add_shot", guarded([](Capture& self, const std::string& name, const std::string& file, std::size_t camera) {
+             return self.add_shot(name, file, camera);
+           }),
+           "name"_a, "file"_a, "camera"_a, "Adds a photograph without a pose; returns its index.");
 }
 
 void bind_cameras(py::class_<Capture>& c) {
-  c.def_property_readonly(
-       "cameras", [](const Capture& self) { return self.cameras; }, "Copies.")
-      .def(
-          "add_camera",
-          [](Capture& self, const Camera& camera) {
-            self.cameras.push_back(camera);
-            return self.cameras.size() - 1;
-          },
-          "camera"_a, "Returns its index.")
-      .def(
-          "set_camera",
-          [](Capture& self, std::size_t i, const Camera& camera) {
-            if (i >= self.cameras.size()) throw py::index_error("no such camera");
-            self.cameras[i] = camera;
-          },
-          "index"_a, "camera"_a);
+  c.def_property_readonly("cameras", guarded([](const Capture& self) { return self.cameras; }), "Copies.")
+      .def("add_camera", guarded([](Capture& self, const Camera& camera) {
+             self.cameras.push_back(camera);
+             return self.cameras.size() - 1;
+           }),
+           "camera"_a, "Returns its index.")
+      .def("set_camera", guarded([](Capture& self, std::size_t i, const Camera& camera) {
+             if (i >= self.cameras.size()) throw py::index_error("no such camera");
+             self.cameras[i] = camera;
+           }),
+           "index"_a, "camera"_a);
 }
 
 void bind_stages(py::module_& module, py::class_<Capture>& c) {
@@ -155,34 +108,34 @@ void bind_stages(py::module_& module, py::class_<Capture>& c) {
       },
       "stage"_a, "Name -> (default, help).");
 
-  c.def(
-       "set_option",
-       [](Capture& self, const std::string& stage, const std::string& name, const OptionValue& value) {
-         slf::set_option(self, stage, name, value);
-       },
-       "stage"_a, "name"_a, "value"_a, "Stores an option of a stage.")
-      .def(
-          "option",
-          [](const Capture& self, const std::string& stage, const std::string& name) {
-            return slf::effective_option(self, stage, name);
-          },
-          "stage"_a, "name"_a, "The stored value, else the default.")
-      .def(
-          "run",
-          [](Capture& self, bool force, const py::object& progress, unsigned threads) {
-            return work(progress, threads, [&](Job& job) { return slf::run(self, job, force); });
-          },
-          py::kw_only(), "force"_a = false, "progress"_a = py::none(), "threads"_a = 0,
-          "All the stages that are needed. Another thread must not use the capture meanwhile.")
-      .def(
-          "run_stage",
-          [](Capture& self, const std::string& stage, bool force, const py::object& progress, unsigned threads) {
-            return work(progress, threads, [&](Job& job) { return slf::run_stage(self, stage, job, force); });
-          },
-          "stage"_a, py::kw_only(), "force"_a = false, "progress"_a = py::none(), "threads"_a = 0)
-      .def("describe", [](const Capture& self) { return json_loads(slf::describe_json(self)); })
-      .def("read_hull", &read_hull, py::call_guard<py::gil_scoped_release>(), "The hull's mesh.")
-      .def("evaluation", &read_evaluation, "What the stage \"evaluate\" found.");
+  c.def("set_option",
+        guarded([](Capture& self, const std::string& stage, const std::string& name, const OptionValue& value) {
+          slf::set_option(self, stage, name, value);
+        }),
+        "stage"_a, "name"_a, "value"_a, "Stores an option of a stage.")
+      .def("option", guarded([](const Capture& self, const std::string& stage, const std::string& name) {
+             return slf::effective_option(self, stage, name);
+           }),
+           "stage"_a, "name"_a, "The stored value, else the default.")
+      .def("run", guarded([](Capture& self, bool force, const py::object& progress, unsigned threads) {
+             return work(progress, threads, [&](Job& job) { return slf::run(self, job, force); });
+           }),
+           py::kw_only(), "force"_a = false, "progress"_a = py::none(), "threads"_a = 0,
+           "All the stages that are needed. Another thread must not use the capture meanwhile.")
+      .def("run_stage",
+           guarded(
+               [](Capture& self, const std::string& stage, bool force, const py::object& progress, unsigned threads) {
+                 return work(progress, threads, [&](Job& job) { return slf::run_stage(self, stage, job, force); });
+               }),
+           "stage"_a, py::kw_only(), "force"_a = false, "progress"_a = py::none(), "threads"_a = 0)
+      .def("describe", guarded([](const Capture& self) { return json_loads(slf::describe_json(self)); }))
+      .def("read_hull", guarded([](const Capture& self) {
+             py::gil_scoped_release without_gil;
+             return slf::read_hull(self);
+           }),
+           "The hull's mesh.")
+      .def("evaluation", guarded([](const Capture& self) { return json_loads(slf::read_evaluation(self)); }),
+           "What the stage \"evaluate\" found.");
 }
 
 template <class Options>
@@ -244,33 +197,25 @@ void bind_exchange(py::module_& module) {
       },
       "files"_a, "output"_a, py::kw_only(), "reference"_a = false, "progress"_a = py::none(),
       "Photographs without poses.");
-  module.def(
-      "import_masks",
-      [](Capture& capture, const Path& folder) {
-        return work(py::none(), 0, [&](Job& job) { return import_masks(capture, folder, job); });
-      },
-      "capture"_a, "folder"_a, "Adds masks named like their photographs; returns how many.");
-  module.def(
-      "import_enclosure",
-      [](Capture& capture, const Paths& files, bool reference) {
-        return work(py::none(), 0, [&](Job& job) { return import_enclosure(capture, files, reference, job); });
-      },
-      "capture"_a, "files"_a, py::kw_only(), "reference"_a = false,
-      "Adds photographs of the empty enclosure; returns how many.");
-  module.def(
-      "export_colmap",
-      [](const Capture& capture, const Path& folder, double max_refit_error_px) {
-        return export_colmap(capture, folder, {.max_refit_error_px = max_refit_error_px}).largest_refit_error_px;
-      },
-      "capture"_a, "folder"_a, py::kw_only(), "max_refit_error_px"_a = 0.5,
-      "A COLMAP text model; returns the largest error of a lens in px.");
-  module.def(
-      "export_nerf",
-      [](const Capture& capture, const Path& file, double max_refit_error_px) {
-        return export_nerf(capture, file, {.max_refit_error_px = max_refit_error_px}).largest_refit_error_px;
-      },
-      "capture"_a, "file"_a, py::kw_only(), "max_refit_error_px"_a = 0.5,
-      "NeRF's transforms.json; returns the largest error of a lens in px.");
+  module.def("import_masks", guarded([](Capture& capture, const Path& folder) {
+               return work(py::none(), 0, [&](Job& job) { return import_masks(capture, folder, job); });
+             }),
+             "capture"_a, "folder"_a, "Adds masks named like their photographs; returns how many.");
+  module.def("import_enclosure", guarded([](Capture& capture, const Paths& files, bool reference) {
+               return work(py::none(), 0, [&](Job& job) { return import_enclosure(capture, files, reference, job); });
+             }),
+             "capture"_a, "files"_a, py::kw_only(), "reference"_a = false,
+             "Adds photographs of the empty enclosure; returns how many.");
+  module.def("export_colmap", guarded([](const Capture& capture, const Path& folder, double max_refit_error_px) {
+               return export_colmap(capture, folder, {.max_refit_error_px = max_refit_error_px}).largest_refit_error_px;
+             }),
+             "capture"_a, "folder"_a, py::kw_only(), "max_refit_error_px"_a = 0.5,
+             "A COLMAP text model; returns the largest error of a lens in px.");
+  module.def("export_nerf", guarded([](const Capture& capture, const Path& file, double max_refit_error_px) {
+               return export_nerf(capture, file, {.max_refit_error_px = max_refit_error_px}).largest_refit_error_px;
+             }),
+             "capture"_a, "file"_a, py::kw_only(), "max_refit_error_px"_a = 0.5,
+             "NeRF's transforms.json; returns the largest error of a lens in px.");
 }
 
 }  // namespace
@@ -279,16 +224,19 @@ void bind_capture(py::module_& module) {
   py::class_<Capture> c(module, "Capture", "The folder that holds an object's photographs and what was made of them.");
   c.def_static("open", &Capture::open, "folder"_a)
       .def_static("create", &Capture::create, "folder"_a, "A new capture in a new or empty folder.")
-      .def("save", &Capture::save)
-      .def_property_readonly("folder", &Capture::folder)
-      .def_property(
-          "unit_known", [](const Capture& self) { return self.unit == Unit::metres; },
-          [](Capture& self, bool known) { self.unit = known ? Unit::metres : Unit::unknown; },
-          "Whether lengths are metres.")
-      .def_property("hold_out", &Capture::hold_out, &Capture::set_hold_out,
+      .def("save", guarded([](const Capture& self) { self.save(); }))
+      .def_property_readonly("folder", guarded([](const Capture& self) { return self.folder(); }))
+      .def_property("unit_known", guarded([](const Capture& self) { return self.unit == Unit::metres; }),
+                    guarded([](Capture& self, bool known) { self.unit = known ? Unit::metres : Unit::unknown; }),
+                    "Whether lengths are metres.")
+      .def_property("hold_out", guarded([](const Capture& self) { return self.hold_out(); }),
+                    guarded([](Capture& self, int n) { self.set_hold_out(n); }),
                     "Every nth shot (the first, …) is held out; 0: none.")
-      .def_readwrite("background_rgb", &Capture::background_rgb)
-      .def_property_readonly("notes", [](const Capture& self) { return self.notes; });
+      .def_property("background_rgb", guarded([](const Capture& self) { return self.background_rgb; }),
+                    guarded([](Capture& self, const std::optional<std::array<std::uint8_t, 3>>& rgb) {
+                      self.background_rgb = rgb;
+                    }))
+      .def_property_readonly("notes", guarded([](const Capture& self) { return self.notes; }));
   bind_shots(c);
   bind_cameras(c);
   bind_stages(module, c);

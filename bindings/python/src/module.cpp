@@ -1,6 +1,8 @@
 #include <chrono>
 #include <condition_variable>
 #include <exception>
+#include <filesystem>
+#include <map>
 #include <mutex>
 #include <thread>
 
@@ -81,7 +83,26 @@ void do_work(Shared& shared, unsigned threads, const std::function<void(Job&)>& 
   shared.changed.notify_one();
 }
 
+/// Who is in use: -1 by one that changes it, else by so many that read it. The GIL protects it.
+std::map<const void*, int>& users() {
+  static std::map<const void*, int> all;
+  return all;
+}
+
 }  // namespace
+
+InUse::InUse(const void* object, bool alone) : object_(object), alone_(alone) {
+  int& count = users()[object];
+  if (count < 0 || (alone && count > 0))
+    throw Error(ErrorCode::invalid_argument,
+                "a call in another thread, or the one that called back, is still using it; wait for its end", "self");
+  count = alone ? -1 : count + 1;
+}
+
+InUse::~InUse() {
+  const auto at = users().find(object_);
+  if (alone_ || --at->second == 0) users().erase(at);
+}
 
 void run_job(const py::object& progress, unsigned threads, const std::function<void(Job&)>& body) {
   const bool wants_progress = !progress.is_none();
@@ -132,6 +153,8 @@ PYBIND11_MODULE(_lumihull, module) {
       if (p) std::rethrow_exception(p);
     } catch (const Error& e) {
       python::raise_error(e);
+    } catch (const std::filesystem::filesystem_error& e) {
+      python::raise_error(Error(ErrorCode::io, e.code().message(), e.path1().string()));
     }
   });
 

@@ -1,8 +1,9 @@
-#include <capture_renderer.h>
+#include <lumihull/slf/capture_renderer.h>
 #include <lumihull/slf/metrics.h>
 #include <pybind11/stl.h>
 
 #include <memory>
+#include <numbers>
 
 #include "bindings.h"
 
@@ -18,7 +19,7 @@ struct RenderedView {
   py::object depth;
 };
 
-RenderedView render(CaptureRenderer& self, const View& view, int rays, bool depth, const py::object& progress,
+RenderedView render(slf::CaptureRenderer& self, const View& view, int rays, bool depth, const py::object& progress,
                     unsigned threads) {
   view.camera.validate();
   slf::Rendering rendering =
@@ -50,20 +51,30 @@ void bind_views(py::module_& module) {
   py::class_<RenderedView>(module, "Rendering", "A new view.")
       .def_readonly("rgba", &RenderedView::rgba, "(height, width, 4) uint8, sRGB, straight alpha.")
       .def_readonly("depth", &RenderedView::depth, "(height, width) float32, infinite where nothing is; or None.");
-  py::class_<CaptureRenderer>(module, "Renderer", "Renders new views of a capture that has a hull.")
-      .def(py::init<const Capture&, const std::string&>(), "capture"_a, "method"_a = "lumigraph",
-           py::call_guard<py::gil_scoped_release>(), "method: \"lumigraph\", \"mean_texture\" or \"shaded\".")
-      .def("render", &render, "view"_a, py::kw_only(), "rays"_a = 2, "depth"_a = false, "progress"_a = py::none(),
-           "threads"_a = 0, "Renders with rays x rays rays a pixel.")
-      .def(
-          "turntable",
-          [](const CaptureRenderer& self, int frames, int width, int height, double elevation) {
-            std::vector<View> views;
-            for (slf::PathView& p : self.turntable(frames, width, height, elevation)) views.push_back(p.view);
-            return views;
-          },
-          "frames"_a, "width"_a, "height"_a, py::kw_only(), "elevation"_a = 0.35,
-          "Views of a full turn around the object; elevation in radians above the horizon.");
+  py::class_<slf::CaptureRenderer>(module, "Renderer", "Renders new views of a capture that has a hull.")
+      .def(py::init([](const Capture& capture, const std::string& method) {
+             const InUse in_use(&capture, false);
+             py::gil_scoped_release without_gil;
+             return std::make_unique<slf::CaptureRenderer>(capture, method);
+           }),
+           "capture"_a, "method"_a = "lumigraph", "method: \"lumigraph\", \"mean_texture\" or \"shaded\".")
+      .def("render",
+           guarded([](slf::CaptureRenderer& self, const View& view, int rays, bool depth, const py::object& progress,
+                      unsigned threads) { return render(self, view, rays, depth, progress, threads); }),
+           "view"_a, py::kw_only(), "rays"_a = 2, "depth"_a = false, "progress"_a = py::none(), "threads"_a = 0,
+           "Renders with rays x rays rays a pixel.")
+      .def("turntable",
+           guarded([](const slf::CaptureRenderer& self, int frames, int width, int height, double elevation) {
+             std::vector<View> views;
+             for (const slf::PathView& p : self.turntable({.frames = frames,
+                                           .elevation_deg = elevation * 180 / std::numbers::pi,
+                                           .width = width,
+                                           .height = height}))
+               views.push_back(p.view);
+             return views;
+           }),
+           "frames"_a, "width"_a, "height"_a, py::kw_only(), "elevation"_a = 0.35,
+           "Views of a full turn around the object; elevation in radians above the horizon.");
   bind_metrics(module);
 }
 
