@@ -1,6 +1,6 @@
 // lumihull evaluate CAPTURE: renders the photographs that were held out and compares.
 
-#include <lumihull/base/files.h>
+#include <lumihull/slf/results.h>
 
 #include "program.h"
 
@@ -8,7 +8,7 @@ namespace lumihull::program {
 
 void add_evaluate(Program& program) {
   add_stage_verb(program, "evaluate", "render the held-out photographs and compare: PSNR, SSIM, silhouettes",
-                 [](const Capture& capture) { return read_file(capture.folder() / "evaluate" / "evaluation.json"); });
+                 [](const Capture& capture) { return slf::read_evaluation(capture); });
 }
 
 }  // namespace lumihull::program

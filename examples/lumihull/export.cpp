@@ -4,6 +4,7 @@
 #include <lumihull/base/export.h>
 #include <lumihull/base/files.h>
 #include <lumihull/hull/mesh.h>
+#include <lumihull/slf/results.h>
 
 #include <iostream>
 
@@ -29,6 +30,11 @@ void say_exported(Program& program, const Arguments& a, const ExportReport& repo
   if (program.json)
     std::cout << "{\"output\": " << json_text(a.output) << ", \"photos\": " << report.photos
               << ", \"largest_refit_error_px\": " << report.largest_refit_error_px << "}\n";
+}
+
+void say_written(Program& program, const std::string& file, std::size_t count, const std::string& what) {
+  program.say(file + ": " + std::to_string(count) + " " + what);
+  if (program.json) std::cout << "{\"output\": " << json_text(file) << ", \"" << what << "\": " << count << "}\n";
 }
 
 }  // namespace
@@ -60,22 +66,18 @@ void add_export(Program& program) {
   for (const std::string name : {"ply", "obj"})
     format(name, name == "ply" ? "the hull as a PLY mesh" : "the hull as an OBJ mesh", [&program, a, name] {
       refuse_existing(a->output);
-      const Capture capture = Capture::open(a->folder);
-      const hull::Mesh mesh = hull::read_mesh(capture.hull_path());
       const std::filesystem::path file(a->output);
       if (file.extension() != "." + name)
         throw Error(ErrorCode::invalid_argument, "expected a file name that ends in ." + name, a->output);
+      const hull::Mesh mesh = slf::read_hull(Capture::open(a->folder));
       hull::write_mesh(file, mesh);
-      program.say(a->output + ": " + std::to_string(mesh.triangles.size()) + " triangles");
+      say_written(program, a->output, mesh.triangles.size(), "triangles");
     });
   format("glb", "the textured model as binary glTF", [&program, a] {
     refuse_existing(a->output);
-    const Capture capture = Capture::open(a->folder);
-    const std::filesystem::path model = capture.folder() / "textured.glb";
-    if (!std::filesystem::exists(model))
-      throw Error(ErrorCode::not_found, "there is no model yet; `lumihull run` makes one", model.string());
-    write_file(a->output, read_file(model));
-    program.say(a->output + ": " + std::to_string(std::filesystem::file_size(a->output)) + " bytes");
+    const std::string model = read_file(slf::result_of(Capture::open(a->folder).folder() / "textured.glb", "texture"));
+    write_file(a->output, model);
+    say_written(program, a->output, model.size(), "bytes");
   });
 }
 

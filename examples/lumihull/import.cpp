@@ -49,17 +49,18 @@ void add_import(Program& program) {
   CLI::App* verb = program.app.add_subcommand("import", "make a capture of photographs and cameras from elsewhere");
   verb->require_subcommand(1);
 
-  const auto format = [&](const std::string& name, const std::string& help, const std::string& what,
+  // files: how many may be named; -1: any number.
+  const auto format = [&](const std::string& name, const std::string& help, const std::string& what, int files,
                           std::function<Capture()> body) {
     CLI::App* sub = program.verb(
         name, help, [&program, body = std::move(body)] { say_imported(program, body()); }, verb);
-    sub->add_option("files", a->files, what)->required();
+    sub->add_option(files == 1 ? "file" : "files", a->files, what)->required()->expected(files);
     sub->add_option("-o,--output", a->output, "the new capture's folder")->required();
     sub->add_flag("--reference", a->reference, "refer to the photographs where they are instead of copying them");
     return sub;
   };
 
-  format("projections", "a listing of projection matrices: NAME p11 … p34 a line", "the listing",
+  format("projections", "a listing of projection matrices: NAME p11 … p34 a line", "the listing", 1,
          [&program, a] {
            auto options = a->options<ProjectionImportOptions>();
            options.first_pixel_center = a->first_pixel_center;
@@ -68,17 +69,17 @@ void add_import(Program& program) {
       ->add_option("--first-pixel-center", a->first_pixel_center,
                    "the coordinate that the matrices give to the first pixel's centre: 0.5, 0 or 1 [0.5]")
       ->check(CLI::Range(-1.0, 1.0));
-  format("middlebury", "a Middlebury multi-view file: *_par.txt", "the file",
+  format("middlebury", "a Middlebury multi-view file: *_par.txt", "the file", 1,
          [&program, a] { return import_middlebury(a->files.at(0), a->options<ImportOptions>(), program.job()); });
-  format("nerf", "NeRF's transforms*.json; an alpha channel becomes the mask", "one or more files", [&program, a] {
+  format("nerf", "NeRF's transforms*.json; an alpha channel becomes the mask", "one or more files", -1, [&program, a] {
     return import_nerf(a->paths(), a->refit_options(), program.job());
   })->add_option("--max-refit-error", a->max_refit_error, "largest error of a refitted lens, px [0.5]");
-  CLI::App* colmap = format("colmap", "a COLMAP model, text or binary", "the model's folder", [&program, a] {
+  CLI::App* colmap = format("colmap", "a COLMAP model, text or binary", "the model's folder", 1, [&program, a] {
     return import_colmap(a->files.at(0), a->images, a->refit_options(), program.job());
   });
   colmap->add_option("--images", a->images, "the folder that the model's image names are relative to")->required();
   colmap->add_option("--max-refit-error", a->max_refit_error, "largest error of a refitted lens, px [0.5]");
-  format("photos", "photographs without cameras", "the photographs",
+  format("photos", "photographs without cameras", "the photographs", -1,
          [&program, a] { return import_photos(a->paths(), a->options<ImportOptions>(), program.job()); });
 
   CLI::App* masks = program.verb(

@@ -1,13 +1,9 @@
 // lumihull render CAPTURE: new views.
 
 #include <lumihull/base/error.h>
-#include <lumihull/hull/mesh.h>
-#include <lumihull/hull/ray_scene.h>
 #include <lumihull/slf/camera_path.h>
-#include <lumihull/slf/glb.h>
-#include <lumihull/slf/lumigraph.h>
+#include <lumihull/slf/capture_renderer.h>
 #include <lumihull/slf/metrics.h>
-#include <lumihull/slf/photos.h>
 
 #include <filesystem>
 #include <iostream>
@@ -22,7 +18,7 @@ namespace {
 struct Arguments {
   std::string folder, output, cameras, method = "lumigraph", background = "transparent";
   slf::TurntableOptions turntable;
-  int frames = 0, rays = 2;
+  int rays = 2;
   bool held_out = false, overwrite = false;
 };
 
@@ -38,33 +34,18 @@ std::optional<std::array<std::uint8_t, 3>> parse_background(const std::string& t
   return std::array{std::uint8_t(rgb[0]), std::uint8_t(rgb[1]), std::uint8_t(rgb[2])};
 }
 
-std::vector<slf::PathView> path_of(const Arguments& a, const Capture& capture, const hull::Mesh& mesh) {
+std::vector<slf::PathView> path_of(const Arguments& a, const Capture& capture, const slf::CaptureRenderer& renderer) {
   if (a.held_out) return slf::views_of_shots(capture, slf::held_out_shots(capture));
   if (!a.cameras.empty()) return slf::read_camera_path(a.cameras);
-  std::vector<View> views;
-  for (const std::size_t i : slf::training_shots(capture)) views.push_back(capture.view(i));
-  slf::TurntableOptions options = a.turntable;
-  if (a.frames) options.frames = a.frames;
-  return slf::turntable(mesh, views, options);
+  return renderer.turntable(a.turntable);
 }
 
 void render(Program& program, const Arguments& a) {
   const Capture capture = Capture::open(a.folder);
   const auto background = parse_background(a.background);
   const std::filesystem::path output = a.output.empty() ? capture.folder() / "render" : std::filesystem::path(a.output);
-  const bool lumigraph = a.method == "lumigraph", texture = a.method == "mean_texture";
-
-  // The texture lies on its own copy of the mesh, in textured.glb; the lumigraph needs the hull alone.
-  slf::TexturedMesh textured;
-  if (texture)
-    textured = slf::read_glb(capture.folder() / "textured.glb");
-  else
-    textured.mesh = hull::read_mesh(capture.hull_path());
-  const hull::RayScene scene(textured.mesh);
-  std::optional<slf::Lumigraph> blender;
-  if (lumigraph) blender.emplace(textured.mesh, scene, slf::photos_of(capture, slf::training_shots(capture)));
-
-  const std::vector<slf::PathView> path = path_of(a, capture, textured.mesh);
+  slf::CaptureRenderer renderer(capture, a.method);
+  const std::vector<slf::PathView> path = path_of(a, capture, renderer);
   if (path.empty()) throw Error(ErrorCode::not_found, "no photograph is held out", capture.folder().string());
   std::filesystem::create_directories(output);
   if (!a.overwrite)
@@ -79,9 +60,7 @@ void render(Program& program, const Arguments& a) {
   job.begin("rendering", path.size());
   for (const slf::PathView& p : path) {
     job.check();
-    slf::Rendering rendering = lumigraph ? blender->render(p.view, options, frame_job)
-                               : texture ? slf::render_texture(textured, scene, p.view, options, frame_job)
-                                         : slf::render_shaded(textured.mesh, scene, p.view, options, frame_job);
+    slf::Rendering rendering = renderer.render(p.view, options, frame_job);
     if (background) rendering.rgba = slf::composited(rendering.rgba, *background);
     write_png(output / (p.name + ".png"), rendering.rgba);
     job.advance();
@@ -103,8 +82,8 @@ void add_render(Program& program) {
   verb->add_option("--method", a->method,
                    "lumigraph (blends photographs), mean_texture or shaded (bare hull) [lumigraph]")
       ->check(CLI::IsMember({"lumigraph", "mean_texture", "shaded"}));
-  auto* turntable =
-      verb->add_option("--turntable", a->frames, "so many frames around the object [60]")->check(CLI::Range(1, 100000));
+  auto* turntable = verb->add_option("--turntable", a->turntable.frames, "so many frames around the object [60]")
+                        ->check(CLI::Range(1, 100000));
   auto* cameras = verb->add_option("--cameras", a->cameras, "cameras from a JSON file")->excludes(turntable);
   verb->add_flag("--held-out", a->held_out, "at the photographs that were held out")
       ->excludes(turntable)

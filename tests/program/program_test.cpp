@@ -98,10 +98,10 @@ TEST_F(ProgramTest, RunsFromPhotographsToTheReport) {
       0);
   EXPECT_TRUE(fs::exists(mine_ / "t" / "frame_0002.png"));
   EXPECT_EQ(lumihull({"render", capture(), "--turntable", "3", "-o", mine_ / "t"}).status, 2) << "never overwrites";
-  ASSERT_EQ(
-      lumihull({"render", capture(), "--held-out", "--method", "mean_texture", "--background", "1,2,3", "-o", mine_ / "h"})
-          .status,
-      0);
+  ASSERT_EQ(lumihull({"render", capture(), "--held-out", "--method", "mean_texture", "--background", "1,2,3", "-o",
+                      mine_ / "h"})
+                .status,
+            0);
   EXPECT_EQ(std::distance(fs::directory_iterator(mine_ / "h"), {}), 3);
   const Capture c = Capture::open(capture_);
   const slf::PathView view{"mine", c.view(2)};
@@ -110,7 +110,9 @@ TEST_F(ProgramTest, RunsFromPhotographsToTheReport) {
   EXPECT_TRUE(fs::exists(mine_ / "m" / "mine.png"));
 
   for (const auto& [format, name] : {std::pair{"ply", "m.ply"}, {"obj", "m.obj"}, {"glb", "m.glb"}}) {
-    EXPECT_EQ(lumihull({"export", format, capture(), "-o", mine_ / name}).status, 0) << format;
+    const Outcome exported = lumihull({"export", format, capture(), "-o", mine_ / name, "--json"});
+    EXPECT_EQ(exported.status, 0) << format;
+    EXPECT_EQ(nlohmann::json::parse(exported.out)["output"], (mine_ / name).string());
     EXPECT_GT(fs::file_size(mine_ / name), 1000u);
     EXPECT_EQ(lumihull({"export", format, capture(), "-o", mine_ / name}).status, 2) << "never overwrites";
   }
@@ -125,6 +127,7 @@ TEST_F(ProgramTest, WrongUseIsStatusTwo) {
   EXPECT_EQ(words.status, 2);
   EXPECT_THAT(words.err, HasSubstr("resolution"));
   EXPECT_EQ(lumihull({"run", capture(), "--hold-out", "1"}).status, 2);
+  EXPECT_EQ(lumihull({"import", "projections", "P.txt", "more.txt", "-o", mine_ / "new"}).status, 2);
   const Outcome help = lumihull({"hull", "--help"});
   EXPECT_EQ(help.status, 0);
   EXPECT_THAT(help.out, HasSubstr("--resolution"));
@@ -133,6 +136,9 @@ TEST_F(ProgramTest, WrongUseIsStatusTwo) {
 TEST_F(ProgramTest, NotACapture) {
   expect_failure(lumihull({"run", mine_ / "nowhere"}), "capture.json");
   expect_failure(lumihull({"hull", capture()}), "mask");
+  expect_failure(lumihull({"render", capture()}), "hull");
+  expect_failure(lumihull({"render", capture(), "--method", "mean_texture"}), "run the stage \"texture\" first");
+  expect_failure(lumihull({"export", "ply", capture(), "-o", mine_ / "m.ply"}), "run the stage \"hull\" first");
 }
 
 TEST_F(ProgramTest, ATruncatedPhotographIsNamed) {
@@ -171,8 +177,8 @@ TEST_F(ProgramTest, AFullDiskLeavesTheCaptureAsItWas) {
 }
 
 TEST_F(ProgramTest, KilledAtAnyTimeItGoesOn) {
-  // A file that a killed process was just writing may stay beside under its temporary name; the files themselves are
-  // whole, masks that were keyed are not taken for drawn ones, and the next run ends.
+  // The files themselves are whole, masks that were keyed are not taken for drawn ones, and the next run ends and takes
+  // away what the killed ones had half written.
   for (const double seconds : {0.02, 0.05, 0.1, 0.2, 0.4}) {
     const Outcome killed = lumihull({"run", capture(), "-q", "--resolution", "96"}, {.kill_after_s = seconds});
     if (killed.status == 0) break;
@@ -186,6 +192,8 @@ TEST_F(ProgramTest, KilledAtAnyTimeItGoesOn) {
   ASSERT_EQ(end.status, 0) << end.err;
   const Capture c = Capture::open(capture_);
   for (const Shot& shot : c.shots) EXPECT_EQ(c.mask_state(shot), MaskSource::keyed) << shot.name;
+  for (const auto& entry : fs::recursive_directory_iterator(capture_))
+    EXPECT_THAT(entry.path().filename().string(), Not(HasSubstr(".part")));
 }
 
 TEST_F(ProgramTest, CtrlCStopsCleanly) {
