@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
   unsigned threads = 0;
   bool plain = false, fast = false, no_distortion = false;
   app.add_option("-o,--output", output, "folder to make; must be new or empty")->required();
-  app.add_option("--object", options.object, "vase, bust, statue, box, sphere, or a mesh file (.obj, .ply)")
+  app.add_option("--object", options.object, "vase, bust, statue, gate, box, sphere, or a mesh file (.obj, .ply)")
       ->capture_default_str();
   app.add_option("--size", options.size_m, "longest side of the object, m")->capture_default_str();
   app.add_option("--photos", options.photos, "photographs of the object")->capture_default_str();

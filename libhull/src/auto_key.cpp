@@ -7,12 +7,14 @@
 #include <cmath>
 
 #include "learn_key.h"
+#include "repair_mask.h"
 
 namespace lumihull::hull {
 namespace {
 
 constexpr double kSpeck = 2e-4, kHole = 1e-4;  // of the picture; what `clean` takes away and fills
 constexpr double kShadowHole = 3e-3;           // as kHole, for shadows before a dark enclosure
+constexpr std::size_t kMostLooks = 64;         // photographs that are compared before any mask is written
 
 [[noreturn]] void fail(const std::string& message) { throw Error(ErrorCode::invalid_argument, message, "key options"); }
 
@@ -61,6 +63,55 @@ calib::ColorKey key_of_regions(const Capture& capture, const KeyOptions& options
     }
   }
   return train(histogram.counts(), options, job);
+}
+
+CoarseView coarse_view(const Capture& capture, std::size_t shot, const Image& photo) {
+  CoarseView view;
+  view.step = thinning_step(photo.width(), photo.height());
+  view.view = capture.view(shot);
+  view.frame = {0, 0, std::max(1, photo.width() / view.step), std::max(1, photo.height() / view.step)};
+  return view;
+}
+
+Image cleaned(Image mask) {
+  const double pixels = double(mask.width()) * mask.height();
+  calib::clean_mask(mask, int(kSpeck * pixels), int(kHole * pixels));
+  return mask;
+}
+
+bool is_given(const Capture& capture, std::size_t shot) {
+  const MaskSource source = capture.mask_state(capture.shots[shot]);
+  return source == MaskSource::imported || source == MaskSource::edited;
+}
+
+/// Looks at some of the shots coarsely, to know what masks the others contradict.
+std::optional<MaskRepair> look_around(const Capture& capture, std::span<const std::size_t> shots,
+                                      const calib::ColorKey& key, Job& job) {
+  std::vector<std::size_t> positioned;
+  for (const std::size_t shot : shots)
+    if (capture.positioned(shot)) positioned.push_back(shot);
+  const std::size_t n = positioned.size(), used = std::min(n, kMostLooks);
+  std::vector<CoarseView> views(used);
+  std::vector<Image> photos(used);
+  std::vector<std::uint8_t> given(used, 0);
+  job.begin("comparing silhouettes", used);
+  parallel_for(
+      job, used,
+      [&](std::size_t i) {
+        // One of each stretch of shots, at changing places in it: a fixed step could follow the trajectory's own.
+        const std::size_t first = i * n / used, stretch = (i + 1) * n / used - first;
+        const std::size_t shot = positioned[first + i * 0x9E3779B97F4A7C15u % 1009 % stretch];
+        const Image photo = calib::keyable(capture.read_photo(shot));
+        views[i] = coarse_view(capture, shot, photo);
+        photos[i] = thinned(photo, views[i].step);
+        given[i] = is_given(capture, shot);
+        views[i].mask = given[i] ? thinned(capture.read_mask(shot), views[i].step)
+                                 : cleaned(calib::key_image(key, photos[i], {calib::EdgeMode::hard, 0, 0}));
+      },
+      true);
+  auto repair = MaskRepair::learn(views, photos, given, job);
+  job.end();
+  return repair;
 }
 
 /// Sets to background what is in the scan's frame, or where the object can't be.
@@ -127,8 +178,7 @@ KeyReport key_capture(Capture& capture, const KeyOptions& options, Job& job) {
   std::vector<std::size_t> training, todo;
   for (std::size_t i = 0; i < capture.shots.size(); ++i) {
     if (!capture.held_out(i)) training.push_back(i);
-    const MaskSource source = capture.mask_state(capture.shots[i]);
-    if (source == MaskSource::imported || source == MaskSource::edited)
+    if (is_given(capture, i))
       ++report.kept;
     else
       todo.push_back(i);
@@ -154,7 +204,12 @@ KeyReport key_capture(Capture& capture, const KeyOptions& options, Job& job) {
     report.source = "file";
   }
 
+  std::optional<MaskRepair> repair;
+  if (options.clean && !todo.empty())
+    repair = learned ? std::move(learned->repair) : look_around(capture, training, *key, job);
+
   std::vector<double> object_share(todo.size());  // of the picture
+  std::vector<std::uint8_t> mended(todo.size(), 0);
   job.begin("keying", todo.size());
   parallel_for(
       job, todo.size(),
@@ -165,12 +220,27 @@ KeyReport key_capture(Capture& capture, const KeyOptions& options, Job& job) {
         const double pixels = double(photo.width()) * photo.height();
         const int speck = options.clean ? int(kSpeck * pixels) : 0, hole = options.clean ? int(kHole * pixels) : 0;
         Image mask;
-        if (!learned) {
-          mask = calib::key_image(*key, photo, {options.edges, speck, hole});
-        } else {
+        if (learned) {
           mask = calib::key_image(*key, photo, {calib::EdgeMode::hard, 0, 0});
           confine(mask, photo, capture, shot, *learned);
-          if (options.clean) fill_shadows(mask, capture, shot, *learned);
+        }
+        std::optional<MaskRepair::Patch> patch;
+        int step = 1;
+        if (repair && capture.positioned(shot)) {
+          CoarseView view = coarse_view(capture, shot, photo);
+          step = view.step;
+          const Image thin = thinned(photo, step);
+          view.mask =
+              cleaned(learned ? thinned(mask, step) : calib::key_image(*key, thin, {calib::EdgeMode::hard, 0, 0}));
+          patch = repair->find(view, thin);
+        }
+        if (!learned && !patch) {
+          mask = calib::key_image(*key, photo, {options.edges, speck, hole});
+        } else {
+          if (!learned) mask = calib::key_image(*key, photo, {calib::EdgeMode::hard, 0, 0});
+          if (patch) mend(mask, photo, *patch, step);
+          mended[i] = patch.has_value();
+          if (learned && options.clean) fill_shadows(mask, capture, shot, *learned);
           calib::clean_mask(mask, speck, hole);
           calib::soften_edges(mask, photo, options.edges);
         }
@@ -193,6 +263,7 @@ KeyReport key_capture(Capture& capture, const KeyOptions& options, Job& job) {
                                                                                  : ": nothing was keyed as object"));
   }
   report.keyed = todo.size();
+  report.mended = std::size_t(std::count(mended.begin(), mended.end(), 1));
   if (!todo.empty() && unusable == todo.size())
     throw Error(ErrorCode::degenerate,
                 "the masks of all photographs are empty or full: give photographs of the empty enclosure, or regions",

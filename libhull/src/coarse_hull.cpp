@@ -7,11 +7,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 namespace lumihull::hull {
 namespace {
 
-constexpr int kBlock = 8;  // voxels between exact projections; linear in between
+constexpr int kBlock = 8;       // voxels between exact projections; linear in between
+constexpr int kDeepest = 15;    // of the depths, voxels
+constexpr int kFirstShare = 2;  // the box is found at a resolution so many times coarser
 
 /// Projections of a lattice of points over the grid, in coarse pixels; u is NaN where there is none.
 struct Lattice {
@@ -35,23 +38,23 @@ Lattice project(const CoarseView& view, const Eigen::Vector3d& low, double voxel
   return lattice;
 }
 
-/// Calls visit(x, u, v) for the voxels x of a row within a layer, u and v being their centres' coarse pixels.
-template <class Visit>
-void visit_row(const Lattice& lattice, int y, int z, Visit&& visit) {
+/// Calls visit(x, u, v) for the voxels x of a row within a layer, u and v being their centres' coarse pixels; not for
+/// blocks b of voxels with !wanted(b).
+template <class Wanted, class Visit>
+void visit_row(const Lattice& lattice, int y, int z, Wanted&& wanted, Visit&& visit) {
   const int by = y / kBlock, bz = z / kBlock;
   const float fy = (float(y % kBlock) + 0.5f) / kBlock, fz = (float(z % kBlock) + 0.5f) / kBlock;
   const auto side = [&](int bx) -> Eigen::Vector2f {
     return (1 - fz) * ((1 - fy) * lattice.at(bx, by, bz) + fy * lattice.at(bx, by + 1, bz)) +
            fz * ((1 - fy) * lattice.at(bx, by, bz + 1) + fy * lattice.at(bx, by + 1, bz + 1));
   };
-  Eigen::Vector2f from = side(0);
   for (int bx = 0; bx + 1 < lattice.points; ++bx) {
-    const Eigen::Vector2f to = side(bx + 1), step = (to - from) / kBlock;
+    if (!wanted(bx)) continue;
+    const Eigen::Vector2f from = side(bx), step = (side(bx + 1) - from) / kBlock;
     for (int i = 0; i < kBlock; ++i) {
       const Eigen::Vector2f uv = from + (float(i) + 0.5f) * step;
       visit(bx * kBlock + i, uv.x(), uv.y());
     }
-    from = to;
   }
 }
 
@@ -145,22 +148,39 @@ std::vector<std::uint8_t> CoarseHull::vote(std::span<const CoarseView> views, co
   parallel_for(job, views.size(),
                [&](std::size_t i) { lattices[i] = project(views[i], grid.low, grid.voxel, grid.n); });
   std::vector<std::uint8_t> kept(n * layer, 0);
+  // Every so many-th view, so that views that follow each other see the object from different sides, and most of the
+  // box is decided by the first few.
+  const std::size_t count = views.size();
+  std::size_t stride = std::max<std::size_t>(1, std::size_t(double(count) * 0.38));
+  while (std::gcd(stride, count) != 1) ++stride;
+  const double most = tolerance * double(count);  // a voxel with more views against it is gone, whoever else sees it
+  const std::size_t blocks = n / kBlock;
   parallel_for(job, n, [&](std::size_t z) {
     std::vector<std::uint16_t> seen(layer, 0), against(layer, 0);
-    for (std::size_t i = 0; i < views.size(); ++i) {
+    std::vector<std::uint8_t> open(n * blocks, 1);
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t i = k * stride % count;
       const CoarseView& v = views[i];
       const std::uint8_t* mask = v.mask.row<std::uint8_t>(0);
       const std::size_t width = std::size_t(v.mask.width());
       const float x0 = float(v.frame.x0), x1 = float(v.frame.x1), y0 = float(v.frame.y0), y1 = float(v.frame.y1);
       for (std::size_t y = 0; y < n; ++y)
-        visit_row(lattices[i], int(y), int(z), [&](int x, float u, float w) {
-          if (!(u >= x0 && u < x1 && w >= y0 && w < y1)) return;
-          const std::size_t at = y * n + std::size_t(x);
-          ++seen[at];
-          against[at] = std::uint16_t(against[at] + (mask[std::size_t(w) * width + std::size_t(u)] < 128));
-        });
+        visit_row(
+            lattices[i], int(y), int(z),
+            [&](int block) {
+              std::uint8_t& is_open = open[y * blocks + std::size_t(block)];
+              if (!is_open) return false;
+              const std::uint16_t* a = &against[y * n + std::size_t(block) * kBlock];
+              return (is_open = double(*std::min_element(a, a + kBlock)) <= most) != 0;
+            },
+            [&](int x, float u, float w) {
+              if (!(u >= x0 && u < x1 && w >= y0 && w < y1)) return;
+              const std::size_t at = y * n + std::size_t(x);
+              ++seen[at];
+              against[at] = std::uint16_t(against[at] + (mask[std::size_t(w) * width + std::size_t(u)] < 128));
+            });
     }
-    const std::size_t least = std::max<std::size_t>(2, views.size() / 2);
+    const std::size_t least = std::max<std::size_t>(2, count / 2);
     for (std::size_t i = 0; i < layer; ++i)
       kept[z * layer + i] = seen[i] >= least && double(against[i]) <= tolerance * double(seen[i]);
   });
@@ -174,11 +194,15 @@ std::optional<CoarseHull> CoarseHull::carve(std::span<const CoarseView> views, i
   if (!region) return std::nullopt;
   CoarseHull hull;
   auto [center, half] = *region;
-  const int n = (resolution + kBlock - 1) / kBlock * kBlock;
-  // First in a box around everything, larger where the hull touches it; then in the box that the hull fills.
+  const int fine = (resolution + kBlock - 1) / kBlock * kBlock;
+  // First in a box around everything, larger where the hull touches it; then, finely, in the box that the hull fills.
+  bool fits = false;
   for (int attempt = 0;; ++attempt) {
+    const bool last = fits || attempt >= 5;
+    const int n = last ? fine : (fine / kFirstShare + kBlock - 1) / kBlock * kBlock;
     hull.grid_ = {center - Eigen::Vector3d::Constant(half), 2 * half / n, n};
     hull.kept_ = vote(views, hull.grid_, tolerance, job);
+    if (last) break;
     Eigen::Vector3i low = Eigen::Vector3i::Constant(n), high = Eigen::Vector3i::Constant(-1);
     for (int z = 0; z < n; ++z)
       for (int y = 0; y < n; ++y)
@@ -188,15 +212,39 @@ std::optional<CoarseHull> CoarseHull::carve(std::span<const CoarseView> views, i
             high = high.cwiseMax(Eigen::Vector3i(x, y, z));
           }
     if (high.x() < 0) return std::nullopt;
-    const bool touches = low.minCoeff() == 0 || high.maxCoeff() == n - 1;
     const Eigen::Vector3i size = high - low + Eigen::Vector3i::Ones();
-    if (attempt >= 4 || (!touches && size.maxCoeff() * 10 >= n * 8)) return hull;
-    if (touches) {
+    if (low.minCoeff() == 0 || high.maxCoeff() == n - 1) {
       half *= 1.4;
       continue;
     }
+    // A box that the hull fills but for a fifth is kept; else the next one is tight, to within the coarse voxels.
+    fits = true;
+    if (size.maxCoeff() * 10 >= n * 8) continue;
     center = hull.grid_.low + hull.grid_.voxel * 0.5 * (low + high + Eigen::Vector3i::Ones()).cast<double>();
-    half = hull.grid_.voxel * (0.5 * size.maxCoeff() + 2);
+    half = hull.grid_.voxel * (0.5 * size.maxCoeff() + 1.5);
+    fits = size.maxCoeff() * 4 >= n;  // of a hull that was tiny in its box little is known yet
+  }
+  if (std::find(hull.kept_.begin(), hull.kept_.end(), 1) == hull.kept_.end()) return std::nullopt;
+  hull.measure_depth();
+  return hull;
+}
+
+void CoarseHull::measure_depth() {
+  const std::size_t n = std::size_t(grid_.n), count = kept_.size();
+  std::vector<std::uint8_t> rows(count), planes(count), inner = kept_;
+  for (int depth = 1; depth < kDeepest; ++depth) {
+    // Voxels whose 26 neighbours are all there: one axis after another. Rows are taken to follow each other: the hull
+    // keeps away from the grid's border.
+    const auto shrink = [&](const std::vector<std::uint8_t>& in, std::vector<std::uint8_t>& out, std::size_t step) {
+      std::fill(out.begin(), out.end(), std::uint8_t(0));
+      for (std::size_t i = step; i + step < count; ++i) out[i] = in[i - step] & in[i] & in[i + step];
+    };
+    shrink(inner, rows, 1);
+    shrink(rows, planes, n);
+    shrink(planes, inner, n * n);
+    std::uint8_t any = 0;
+    for (std::size_t i = 0; i < count; ++i) kept_[i] = std::uint8_t(kept_[i] + inner[i]), any |= inner[i];
+    if (!any) break;
   }
 }
 
@@ -217,12 +265,51 @@ Image CoarseHull::silhouette(const CoarseView& view, int grow) const {
     for (int y = 0; y < grid_.n; ++y) {
       const std::uint8_t* kept =
           kept_.data() + (std::size_t(z) * std::size_t(grid_.n) + std::size_t(y)) * std::size_t(grid_.n);
-      visit_row(lattice, y, z, [&](int x, float u, float v) {
-        if (!kept[x] || !(u >= 0 && u < float(out.width()) && v >= 0 && v < float(out.height()))) return;
-        out.row<std::uint8_t>(int(v))[int(u)] = 255;
-      });
+      visit_row(
+          lattice, y, z,
+          [&](int block) {
+            return std::any_of(kept + block * kBlock, kept + (block + 1) * kBlock,
+                               [](std::uint8_t k) { return k != 0; });
+          },
+          [&](int x, float u, float v) {
+            if (!kept[x] || !(u >= 0 && u < float(out.width()) && v >= 0 && v < float(out.height()))) return;
+            out.row<std::uint8_t>(int(v))[int(u)] = 255;
+          });
     }
   return grown(out, reach);
+}
+
+Image CoarseHull::depth(const CoarseView& view, int least) const {
+  const int width = view.mask.width(), height = view.mask.height();
+  // One cell of the picture for each voxel's width: every ray through the hull meets voxels' centres in its cell.
+  const float cells_per_px = float(1 / std::max(1.0, voxel_px(view)));
+  Image cells(int(float(width) * cells_per_px) + 1, int(float(height) * cells_per_px) + 1, 1);
+  const Lattice lattice = project(view, grid_.low, grid_.voxel, grid_.n);
+  for (int z = 0; z < grid_.n; ++z)
+    for (int y = 0; y < grid_.n; ++y) {
+      const std::uint8_t* kept =
+          kept_.data() + (std::size_t(z) * std::size_t(grid_.n) + std::size_t(y)) * std::size_t(grid_.n);
+      visit_row(
+          lattice, y, z,
+          [&](int block) {
+            const std::uint8_t* k = kept + block * kBlock;
+            return *std::max_element(k, k + kBlock) >= least;
+          },
+          [&](int x, float u, float v) {
+            if (kept[x] < least || !(u >= 0 && u < float(width) && v >= 0 && v < float(height))) return;
+            std::uint8_t& cell = cells.row<std::uint8_t>(int(v * cells_per_px))[int(u * cells_per_px)];
+            cell = std::max(cell, kept[x]);
+          });
+    }
+  Image out(width, height, 1);
+  std::vector<int> column(static_cast<std::size_t>(width));
+  for (int x = 0; x < width; ++x) column[std::size_t(x)] = int((float(x) + 0.5f) * cells_per_px);
+  for (int y = 0; y < height; ++y) {
+    const std::uint8_t* in = cells.row<std::uint8_t>(int((float(y) + 0.5f) * cells_per_px));
+    std::uint8_t* to = out.row<std::uint8_t>(y);
+    for (int x = 0; x < width; ++x) to[x] = in[column[std::size_t(x)]];
+  }
+  return out;
 }
 
 Image grown(const Image& mask, int radius) {

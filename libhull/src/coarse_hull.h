@@ -35,6 +35,10 @@ class CoarseHull {
   /// Where the hull is in a view, grown by `grow` coarse pixels: 8 bits, 255 inside.
   Image silhouette(const CoarseView& view, int grow) const;
 
+  /// How deep in the hull the rays of a view's pixels come: 8 bits, in voxels, 1 at the hull's surface, 0 where the ray
+  /// misses it, at most 15. Right to within a voxel's width across the ray. Voxels less deep than `least` count as 0.
+  Image depth(const CoarseView& view, int least) const;
+
   /// How far beyond `silhouette` the object may reach in a view, coarse pixels: what the grid can't tell.
   int margin_px(const CoarseView& view) const;
 
@@ -48,9 +52,11 @@ class CoarseHull {
   double voxel_px(const CoarseView& view) const;
   static std::vector<std::uint8_t> vote(std::span<const CoarseView> views, const Grid& grid, double tolerance,
                                         Job& job);
+  void measure_depth();
 
   Grid grid_;
-  std::vector<std::uint8_t> kept_;  ///< n³, x fastest
+  /// n³, x fastest; 0: carved; else the voxels to the nearest carved one along any of the 26 ways, at most kDeepest.
+  std::vector<std::uint8_t> kept_;
 };
 
 /// Object pixels of an 8-bit mask (>= 128) and all within `radius` pixels along rows and columns of one: 255, else 0.

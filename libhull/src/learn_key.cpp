@@ -95,10 +95,12 @@ Image thinned(const Image& photo, int step) {
   Image out(std::max(1, photo.width() / step), std::max(1, photo.height() / step), photo.channels());
   const int channels = photo.channels();
   for (int y = 0; y < out.height(); ++y) {
-    const std::uint8_t* in = photo.row<std::uint8_t>(y * step + step / 2);
+    // (A picture narrower than a step still has a column.)
+    const std::uint8_t* in = photo.row<std::uint8_t>(std::min(y * step + step / 2, photo.height() - 1)) +
+                             std::min(step / 2, photo.width() - 1) * channels;
     std::uint8_t* to = out.row<std::uint8_t>(y);
-    for (int x = 0; x < out.width(); ++x)
-      std::copy_n(in + (x * step + step / 2) * channels, channels, to + x * channels);
+    for (int x = 0; x < out.width(); ++x, in += step * channels)
+      for (int c = 0; c < channels; ++c) *to++ = in[c];
   }
   return out;
 }
@@ -125,17 +127,22 @@ LearnedKey learn_key(const Capture& capture, std::span<const std::size_t> shots,
 
   std::vector<calib::ColorCount> background = calib::background_of_photos(
       used, [&](std::size_t i) { return photos[i]; }, job);
-  LearnedKey learned{train(background, options, job), {}, 0, {}};
+  LearnedKey learned{train(background, options, job), {}, 0, {}, {}};
 
   std::vector<Image> near(used);  // where the object can be, once there is a hull
   const auto key_views = [&] {
-    parallel_for(job, used, [&](std::size_t i) {
-      views[i].mask = calib::key_image(learned.key, photos[i], {calib::EdgeMode::hard, 0, 0});
-      confine(views[i].mask, views[i].frame, near[i].empty() ? nullptr : &near[i]);
-      calib::clean_mask(views[i].mask, 64, 0);
-    });
+    parallel_for(
+        job, used,
+        [&](std::size_t i) {
+          views[i].mask = calib::key_image(learned.key, photos[i], {calib::EdgeMode::hard, 0, 0});
+          confine(views[i].mask, views[i].frame, near[i].empty() ? nullptr : &near[i]);
+          calib::clean_mask(views[i].mask, 64, 0);
+        },
+        true);
   };
+  job.begin("learning the background: first silhouettes", used);
   key_views();
+  job.end();
   if (std::count(positioned.begin(), positioned.end(), 1) < 3) return learned;
 
   const auto positioned_views = [&] {
@@ -145,26 +152,30 @@ LearnedKey learn_key(const Capture& capture, std::span<const std::size_t> shots,
     return list;
   };
   for (int round = 1; round <= kMostRounds; ++round) {
+    job.begin("learning the background: round " + std::to_string(round), 2 * used);
     std::optional<CoarseHull> hull = CoarseHull::carve(positioned_views(), kResolution, kTolerance, job);
     if (!hull) break;
     learned.hull = std::move(hull);
     learned.rounds = round;
 
     calib::ColorHistogram outside, inside;
-    parallel_for(job, used, [&](std::size_t i) {
-      if (!positioned[i]) return;
-      const CoarseView& v = views[i];
-      near[i] = learned.hull->silhouette(v, learned.hull->margin_px(v));
-      const Image sure = shrunk(v.mask, 4);
-      for (int y = v.frame.y0; y < v.frame.y1; ++y) {
-        const std::uint8_t* p = photos[i].row<std::uint8_t>(y) + 3 * v.frame.x0;
-        const std::uint8_t *is_near = near[i].row<std::uint8_t>(y), *is_sure = sure.row<std::uint8_t>(y);
-        for (int x = v.frame.x0; x < v.frame.x1; ++x, p += 3) {
-          if (!is_near[x]) outside.add({p[0], p[1], p[2]});
-          if (is_near[x] && is_sure[x]) inside.add({p[0], p[1], p[2]});
-        }
-      }
-    });
+    parallel_for(
+        job, used,
+        [&](std::size_t i) {
+          if (!positioned[i]) return;
+          const CoarseView& v = views[i];
+          near[i] = learned.hull->silhouette(v, learned.hull->margin_px(v));
+          const Image sure = shrunk(v.mask, 4);
+          for (int y = v.frame.y0; y < v.frame.y1; ++y) {
+            const std::uint8_t* p = photos[i].row<std::uint8_t>(y) + 3 * v.frame.x0;
+            const std::uint8_t *is_near = near[i].row<std::uint8_t>(y), *is_sure = sure.row<std::uint8_t>(y);
+            for (int x = v.frame.x0; x < v.frame.x1; ++x, p += 3) {
+              if (!is_near[x]) outside.add({p[0], p[1], p[2]});
+              if (is_near[x] && is_sure[x]) inside.add({p[0], p[1], p[2]});
+            }
+          }
+        },
+        true);
     background = outside.counts();
     if (background.empty()) break;
     learned.key = train(background, inside.counts(), options, job);
@@ -172,6 +183,7 @@ LearnedKey learn_key(const Capture& capture, std::span<const std::size_t> shots,
     std::vector<Image> before(used);
     for (std::size_t i = 0; i < used; ++i) before[i] = std::move(views[i].mask);
     key_views();
+    job.end();
     std::size_t changed = 0, object = 0;
     for (std::size_t i = 0; i < used; ++i)
       for (int y = 0; y < before[i].height(); ++y)
@@ -185,6 +197,13 @@ LearnedKey learn_key(const Capture& capture, std::span<const std::size_t> shots,
   const calib::Rgb median = learned.key.background_median();
   if (learned.hull && *std::max_element(median.begin(), median.end()) < kDark)
     learned.solid = CoarseHull::carve(positioned_views(), kResolution, kDarkTolerance, job);
+  if (learned.hull && options.clean) {
+    std::vector<CoarseView> list = positioned_views();
+    std::vector<Image> pictures;
+    for (std::size_t i = 0; i < used; ++i)
+      if (positioned[i]) pictures.push_back(std::move(photos[i]));
+    learned.repair = MaskRepair::learn(list, pictures, std::vector<std::uint8_t>(list.size(), 0), job);
+  }
   return learned;
 }
 

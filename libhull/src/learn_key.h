@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "coarse_hull.h"
+#include "repair_mask.h"
 
 namespace lumihull::hull {
 
@@ -19,9 +20,10 @@ struct LearnedKey {
   int rounds = 0;                  ///< of carving and training again
   /// Before a dark enclosure, where shadows on the object look like it: a hull so forgiving that they do not carve it.
   std::optional<CoarseHull> solid;
+  std::optional<MaskRepair> repair;  ///< where at least five of the photographs have a camera
 };
 
-/// Every step-th pixel of a photograph, so that at most 0.5 million are left: noise stays what it is.
+/// Every step-th pixel of an 8-bit picture, so that at most 0.5 million are left: noise stays what it is.
 Image thinned(const Image& photo, int step);
 int thinning_step(int width, int height);
 

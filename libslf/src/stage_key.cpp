@@ -26,8 +26,8 @@ hull::KeyOptions options_of(const Capture& capture) {
   return o;
 }
 
-/// Masks that keying leaves alone. They are no input of keying (it neither reads nor writes them), but where they come
-/// and go the rest must be done again.
+/// Masks that keying leaves alone. Others are compared with them, and where they come and go the rest must be done
+/// again.
 bool is_given(const Capture& capture, const Shot& shot) {
   const MaskSource state = capture.mask_state(shot);
   return state == MaskSource::imported || state == MaskSource::edited;
@@ -61,6 +61,7 @@ std::vector<std::string> run(Capture& capture, Job& job) {
   std::vector<std::string> said;
   std::string line = std::to_string(report.keyed) + " masks keyed, background from " + report.source;
   if (report.rounds) line += " in " + std::to_string(report.rounds) + " rounds";
+  if (report.mended) line += "; " + std::to_string(report.mended) + " mended, which the others contradict";
   if (report.kept) line += "; " + std::to_string(report.kept) + " imported or drawn masks kept";
   said.push_back(std::move(line));
   for (const std::string& warning : report.warnings) said.push_back("warning: " + warning);
@@ -72,7 +73,7 @@ std::vector<std::string> run(Capture& capture, Job& job) {
 const StageDefinition& key_stage() {
   static const StageDefinition stage{
       "key",
-      1,
+      2,
       {
           {"background",
            "where the background's colours come from: auto, enclosure (photographs of the empty enclosure), photos, "
@@ -90,7 +91,7 @@ const StageDefinition& key_stage() {
            0,
            0,
            {"hard", "soft", "matte"}},
-          {"clean", "remove specks and pinholes, use what is known of the object's place; false: the pure decision",
+          {"clean", "remove specks and pinholes, mend what the other views contradict; false: the pure decision",
            kDefaults.clean},
       },
       needed,

@@ -32,6 +32,7 @@ TEST(Shapes, AreClosedOrientedAndOfTheSizeAsked) {
   const Case cases[] = {{make_vase(.6, 60), 1},
                         {make_bust(.6, 60), 0},
                         {make_statue(.6, 80), 3},
+                        {make_gate(.6, 80), 4},
                         {make_box(.6), 0},
                         {make_sphere(.6, 3), 0}};
   for (const auto& [object, genus] : cases) {

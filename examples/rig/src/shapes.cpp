@@ -108,6 +108,21 @@ float statue(const Vector3f& p) {
   return cut(d, -p.z(), .01f);
 }
 
+float gate(const Vector3f& p) {
+  const Vector3f h = Vector3f(.30f, .16f, .5f) - Vector3f::Constant(.05f);
+  const Vector3f q = (p - Vector3f(0, 0, .5f)).cwiseAbs() - h;
+  float d = q.cwiseMax(0).norm() + std::fmin(q.maxCoeff(), 0.f) - .05f;  // a rounded slab
+  const auto bore = [&](const Vector3f& at, const Vector3f& way, float radius) {
+    const Vector3f axis = way.normalized(), from = p - at;
+    d = cut(d, radius - (from - axis.dot(from) * axis).norm(), .015f);
+  };
+  bore({0, 0, .30f}, {0, 1, .12f}, .14f);       // wide: many photographs see through it
+  bore({-.15f, 0, .68f}, {0, 1, .35f}, .055f);  // narrow: few do
+  bore({.15f, 0, .68f}, {.3f, 1, -.25f}, .055f);
+  bore({0, 0, .86f}, {1, .05f, .12f}, .045f);  // the long way through: hardly any does
+  return cut(d, -p.z(), .01f);
+}
+
 Object from_formula(const char* name, float (*formula)(const Vector3f&), const Vector3f& low, const Vector3f& high,
                     double size, int detail) {
   if (detail < 8 || detail > 1000)
@@ -147,6 +162,12 @@ Object make_bust(double size, int detail) {
 Object make_statue(double size, int detail) {
   Object object = from_formula("statue", statue, {-.36f, -.28f, -.05f}, {.36f, .28f, 1.06f}, size, detail);
   object.material = {Pattern::marble, {{{.055f, .04f, .035f}, {.11f, .075f, .03f}, {}}}, .3f, .10f, .35f};
+  return object;
+}
+
+Object make_gate(double size, int detail) {
+  Object object = from_formula("gate", gate, {-.36f, -.22f, -.05f}, {.36f, .22f, 1.06f}, size, detail);
+  object.material = {Pattern::marble, {{{.72f, .68f, .62f}, {.42f, .36f, .30f}, {}}}, .1f, .05f, .25f};
   return object;
 }
 

@@ -31,8 +31,10 @@ struct LUMIHULL_API KeyOptions {
   /// matte: contours at half coverage. hard and soft keep the key's decision at every pixel.
   calib::EdgeMode edges = calib::EdgeMode::matte;
   /// Takes away specks of less than 0.02 % of the picture and fills holes of up to 0.01 % (learned
-  /// from photographs before a dark enclosure: 0.3 %, where the hull agrees). With clean = false, edges
-  /// hard or soft, and background = "enclosure" the masks are the paper's, pixel by pixel.
+  /// from photographs before a dark enclosure: 0.3 %, where the hull agrees). Where cameras are known, it also
+  /// mends masks that nearly all the others contradict and whose colours are not those beside the object: there the
+  /// object took on the enclosure's colour. With clean = false, edges hard or soft, and background =
+  /// "enclosure" the masks are the paper's, pixel by pixel.
   bool clean = true;
 
   /// Throws Error{invalid_argument} naming the option.
@@ -43,6 +45,7 @@ struct KeyReport {
   std::string source;                 ///< "enclosure", "photos", "photos and cameras", "regions" or "file"
   std::size_t keyed = 0;              ///< masks written
   std::size_t kept = 0;               ///< masks left alone: imported, or edited by a person
+  std::size_t mended = 0;             ///< of the masks written: where the object took on the enclosure's colour
   int rounds = 0;                     ///< train, carve, train again: how often; 0 without cameras
   std::vector<std::string> warnings;  ///< each names its photograph
 };

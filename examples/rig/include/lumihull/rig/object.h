@@ -42,11 +42,13 @@ struct Object {
 
 /// Objects made by formula, `size` metres along the longest side of their box, `detail` cells along it.
 /// vase: surface of revolution with ridges, hollow neck, handle (genus 1). bust: a glossy, nearly convex head.
-/// statue: a dark figure with its arms akimbo (genus 2). box: twelve triangles, checker. sphere: radius size / 2,
-/// vertices on it to float accuracy, 20 * 4^n triangles.
+/// statue: a dark figure with its arms akimbo (genus 2). gate: a pale slab with a wide bore, two narrow ones that few
+/// photographs see through, and one through its length (genus 4). box: twelve triangles, checker. sphere: radius size /
+/// 2, vertices on it to float accuracy, 20 * 4^n triangles.
 Object make_vase(double size, int detail = 100);
 Object make_bust(double size, int detail = 100);
 Object make_statue(double size, int detail = 130);
+Object make_gate(double size, int detail = 100);
 Object make_box(double size);
 Object make_sphere(double size, int subdivisions = 6);
 
@@ -56,8 +58,8 @@ Object make_sphere(double size, int subdivisions = 6);
 /// missing, not finite or indices are out of range.
 Object read_object(const std::filesystem::path& mesh, const std::filesystem::path& texture, double size, bool y_up);
 
-/// By name ("vase", "bust", "statue", "box", "sphere") or a mesh file (y up for OBJ, z up for PLY; a PNG of the same
-/// name beside an OBJ is its texture). Error{invalid_argument} for a name that is neither.
+/// By name ("vase", "bust", "statue", "gate", "box", "sphere") or a mesh file (y up for OBJ, z up for PLY; a PNG of the
+/// same name beside an OBJ is its texture). Error{invalid_argument} for a name that is neither.
 Object object_by_name(const std::string& name, double size);
 
 /// The object's bounding box in its mesh: {low, high}; undefined for an empty mesh.
