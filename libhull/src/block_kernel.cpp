@@ -21,10 +21,11 @@ BlockView::BlockView(const ProjectedView& v, double voxel) : view(&v), scale(flo
   fill(0, lane_u, row_u);
   fill(1, lane_v, row_v);
   fill(2, lane_z, row_z);
-  // u = U / Z: U and Z are each rounded three times (first sample, lane, row), the quotient once: less than
-  // 8 · 2^-24 of u, which is at most the field's width. The field changes by at most one cell a cell along each axis.
+  // u = U · (1 / Z): U and Z are each rounded three times (first sample, lane, row), then the reciprocal and the
+  // product: less than 9 · 2^-24 of u, which is at most the field's width. The field changes by at most one cell a cell
+  // along each axis.
   const double cells = std::max(v.field->cells_x(), v.field->cells_y());
-  error = (2 * 5e-7 * cells + 2e-5) * v.field->cell;
+  error = (2 * 6e-7 * cells + 2e-5) * v.field->cell;
   beyond = before = 0;
   for (int axis = 0; axis < 3; ++axis) {
     beyond += std::max(0.0, 3 * v.m(2, axis) * voxel);
@@ -96,8 +97,9 @@ double merge(const BlockView& block_view, const Eigen::Vector3d& first, Top& top
   const __m256 scale = _mm256_set1_ps(block_view.scale);
   for (std::size_t r = 0; r < 8; ++r) {
     const __m256 z = _mm256_add_ps(base_z, _mm256_set1_ps(block_view.row_z[r]));
-    const __m256 u = _mm256_div_ps(_mm256_add_ps(base_u, _mm256_set1_ps(block_view.row_u[r])), z);
-    const __m256 v = _mm256_div_ps(_mm256_add_ps(base_v, _mm256_set1_ps(block_view.row_v[r])), z);
+    const __m256 inverse = _mm256_div_ps(_mm256_set1_ps(1), z);
+    const __m256 u = _mm256_mul_ps(_mm256_add_ps(base_u, _mm256_set1_ps(block_view.row_u[r])), inverse);
+    const __m256 v = _mm256_mul_ps(_mm256_add_ps(base_v, _mm256_set1_ps(block_view.row_v[r])), inverse);
     const __m256i iu = _mm256_cvttps_epi32(u), iv = _mm256_cvttps_epi32(v);
     const __m256 fu = _mm256_sub_ps(u, _mm256_cvtepi32_ps(iu)), fv = _mm256_sub_ps(v, _mm256_cvtepi32_ps(iv));
     const __m256i entry =
@@ -130,8 +132,9 @@ double merge(const BlockView& block_view, const Eigen::Vector3d& first, Top& top
   for (std::size_t r = 0; r < 8; ++r)
     for (std::size_t lane = 0; lane < 8; ++lane) {
       const float z = (bz + block_view.lane_z[lane]) + block_view.row_z[r];
-      const float u = ((bu + block_view.lane_u[lane]) + block_view.row_u[r]) / z;
-      const float v = ((bv + block_view.lane_v[lane]) + block_view.row_v[r]) / z;
+      const float inverse = 1 / z;
+      const float u = ((bu + block_view.lane_u[lane]) + block_view.row_u[r]) * inverse;
+      const float v = ((bv + block_view.lane_v[lane]) + block_view.row_v[r]) * inverse;
       const int iu = int(u), iv = int(v);
       const float fu = u - float(iu), fv = v - float(iv);
       const std::int32_t tile =
