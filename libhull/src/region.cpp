@@ -104,8 +104,8 @@ std::vector<std::size_t> spread(std::span<const View> views, std::size_t most) {
     // The middle of the picture: the principal point may lie far outside.
     const Eigen::Vector2d d = v.camera.distorted_from_pixel({0.5 * v.camera.width, 0.5 * v.camera.height});
     Signature s;
-    s << (v.center() - mean) * unit,
-        (v.cam_from_world.rotation.conjugate() * Eigen::Vector3d(d.x(), d.y(), 1)).normalized();
+    s.head<3>() = (v.center() - mean) * unit;
+    s.tail<3>() = (v.cam_from_world.rotation.conjugate() * Eigen::Vector3d(d.x(), d.y(), 1)).normalized();
     signatures.push_back(s);
   }
   std::vector<double> nearest(n, std::numeric_limits<double>::infinity());
