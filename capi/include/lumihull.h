@@ -426,7 +426,8 @@ LH_API lh_status lh_capture_read_hull(lh_context *ctx, const lh_capture *capture
 LH_API size_t lh_stage_count(void);
 LH_API const char *lh_stage_name(size_t index);
 
-/** A stage's options as a JSON array of {"name", "help", "default", "low", "high", "choices"}. */
+/** A stage's options as a JSON array of {"name", "help", "default", "low", "high", "choices", "path"};
+    "path": a text that is none of the choices is a file or folder, and is stored as an absolute path. */
 LH_API lh_status lh_stage_options(lh_context *ctx, const char *stage, char *buffer, size_t size, size_t *needed);
 /** Stores an option of a stage: "150", "0.2", "true", "auto", "-1,2,3.5".
  *  @return LH_EINVAL: no such stage or option, wrong type or out of range: says what was expected */

@@ -24,6 +24,7 @@ std::string options_json(std::string_view stage) {
     if (spec.low > -kMax) option["low"] = spec.low;
     if (spec.high < kMax) option["high"] = spec.high;
     if (!spec.choices.empty()) option["choices"] = spec.choices;
+    if (spec.path) option["path"] = true;
     list.push_back(std::move(option));
   }
   return list.dump(1);

@@ -174,10 +174,11 @@ StageFlags::StageFlags(CLI::App* verb, std::vector<std::string_view> stages) {
       if (!spec.choices.empty()) {
         std::string choices;
         for (const std::string& c : spec.choices) choices += (choices.empty() ? "" : "|") + c;
+        if (spec.path) choices += "|PATH";
         flag->option->type_name(choices);
       } else {
         constexpr const char* kTypes[] = {"[true|false]", "INTEGER", "NUMBER", "TEXT", "NUMBER,…"};
-        flag->option->type_name(kTypes[spec.fallback.index()]);
+        flag->option->type_name(spec.path ? "PATH" : kTypes[spec.fallback.index()]);
       }
       flags_.push_back(std::move(flag));
     }

@@ -223,20 +223,18 @@ KeyReport key_capture(Capture& capture, const KeyOptions& options, Job& job) {
         if (learned) {
           mask = calib::key_image(*key, photo, {calib::EdgeMode::hard, 0, 0});
           confine(mask, photo, capture, shot, *learned);
+        } else {
+          mask = calib::key_image(*key, photo, {options.edges, speck, hole});
         }
         std::optional<MaskRepair::Patch> patch;
         int step = 1;
         if (repair && capture.positioned(shot)) {
           CoarseView view = coarse_view(capture, shot, photo);
           step = view.step;
-          const Image thin = thinned(photo, step);
-          view.mask =
-              cleaned(learned ? thinned(mask, step) : calib::key_image(*key, thin, {calib::EdgeMode::hard, 0, 0}));
-          patch = repair->find(view, thin);
+          view.mask = cleaned(thinned(mask, step));
+          if (repair->contradict(view)) patch = repair->find(view, thinned(photo, step));
         }
-        if (!learned && !patch) {
-          mask = calib::key_image(*key, photo, {options.edges, speck, hole});
-        } else {
+        if (learned || patch) {
           if (!learned) mask = calib::key_image(*key, photo, {calib::EdgeMode::hard, 0, 0});
           if (patch) mend(mask, photo, *patch, step);
           mended[i] = patch.has_value();
@@ -247,7 +245,9 @@ KeyReport key_capture(Capture& capture, const KeyOptions& options, Job& job) {
         std::size_t object = 0;
         for (int y = 0; y < mask.height(); ++y) {
           const std::uint8_t* row = mask.row<std::uint8_t>(y);
-          object += std::size_t(std::count_if(row, row + mask.width(), [](std::uint8_t v) { return v >= 128; }));
+          std::uint32_t in_row = 0;
+          for (int x = 0; x < mask.width(); ++x) in_row += row[x] >> 7;
+          object += in_row;
         }
         object_share[i] = double(object) / pixels;
         capture.write_mask(shot, mask, MaskSource::keyed);  // touches its own shot alone

@@ -26,6 +26,11 @@ std::optional<CoarseHull> carve_forgiving(std::span<const CoarseView> views, Job
   return CoarseHull::carve(views, kResolution, (forgiven + 0.5) / double(views.size()), job);
 }
 
+/// Pixels as deep as kSure that make a patch.
+std::size_t least_sure(const Image& mask) {
+  return std::size_t(std::max(4.0, kLeastSure * mask.width() * mask.height()));
+}
+
 /// Sums of a window of (2 kWindow + 1)² pixels over an area, by running sums.
 class WindowSum {
  public:
@@ -83,7 +88,8 @@ std::optional<MaskRepair> MaskRepair::learn(std::span<CoarseView> views, std::sp
     std::vector<std::size_t> mended(views.size(), 0), object(views.size(), 0);
     parallel_for(job, views.size(), [&](std::size_t i) {
       Image& mask = views[i].mask;
-      const auto patch = fixed[i] ? std::nullopt : repair->find(views[i], photos[i]);
+      const bool judged = !fixed[i] && repair->contradict(views[i]);
+      const auto patch = judged ? repair->find(views[i], photos[i]) : std::nullopt;
       for (int y = 0; y < mask.height(); ++y) {
         std::uint8_t* row = mask.row<std::uint8_t>(y);
         for (int x = 0; x < mask.width(); ++x) {
@@ -98,20 +104,20 @@ std::optional<MaskRepair> MaskRepair::learn(std::span<CoarseView> views, std::sp
   }
 }
 
+bool MaskRepair::contradict(const CoarseView& view) const {
+  const Image& mask = view.mask;
+  const Image core = hull_.depth(view, kSure);
+  std::size_t sure = 0;
+  for (int y = 0; y < mask.height(); ++y) {
+    const std::uint8_t *in = mask.row<std::uint8_t>(y), *deep = core.row<std::uint8_t>(y);
+    for (int x = 0; x < mask.width(); ++x) sure += in[x] < 128 && deep[x];
+  }
+  return sure >= least_sure(mask);
+}
+
 std::optional<MaskRepair::Patch> MaskRepair::find(const CoarseView& view, const Image& photo) const {
   const Image& mask = view.mask;
   const int width = mask.width(), height = mask.height();
-  const auto least_sure = std::size_t(std::max(4.0, kLeastSure * width * height));
-  {
-    // Most masks have nothing of the kind: the hull's core is enough to know.
-    const Image core = hull_.depth(view, kSure);
-    std::size_t sure = 0;
-    for (int y = 0; y < height; ++y) {
-      const std::uint8_t *in = mask.row<std::uint8_t>(y), *deep = core.row<std::uint8_t>(y);
-      for (int x = 0; x < width; ++x) sure += in[x] < 128 && deep[x];
-    }
-    if (sure < least_sure) return std::nullopt;
-  }
   const Image depth = hull_.depth(view, 1);
   Image outside(width, height, 1);
   int x0 = width, x1 = 0, y0 = height, y1 = 0;  // box of the doubtful pixels
@@ -179,7 +185,7 @@ std::optional<MaskRepair::Patch> MaskRepair::find(const CoarseView& view, const 
             if (open) open = 0, part.push_back({u, v});
           }
       }
-      if (sure < least_sure) continue;
+      if (sure < least_sure(mask)) continue;
       any = true;
       for (const auto& [px, py] : part) patch.pixels.row<std::uint8_t>(py)[px] = 255;
     }

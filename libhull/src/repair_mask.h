@@ -45,6 +45,9 @@ class MaskRepair {
   static std::optional<MaskRepair> learn(std::span<CoarseView> views, std::span<const Image> photos,
                                          std::span<const std::uint8_t> fixed, Job& job);
 
+  /// Whether a coarse mask shows background where the hull's core is: hardly any does, and the rest need no `find`.
+  bool contradict(const CoarseView& view) const;
+
   /// What of a coarse mask is object although keyed as background.
   struct Patch {
     Image pixels;  ///< 8 bits, 1 channel, coarse: 255 where it is

@@ -1,11 +1,13 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <filesystem>
 #include <utility>
 
 #include "stage.h"
@@ -36,6 +38,7 @@ const OptionSpec& specification(std::string_view stage, std::string_view name) {
 }
 
 std::string number_text(double x) {
+  if (x == std::floor(x) && std::abs(x) < 1e15) return std::to_string(std::int64_t(x));  // to_chars: 1e+06
   std::array<char, 32> text{};
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), x).ptr};
 }
@@ -48,12 +51,17 @@ std::string expectation(const OptionSpec& spec) {
     text = "one of";
     for (const std::string& choice : spec.choices) text += (&choice == spec.choices.data() ? " " : ", ") + choice;
   }
+  if (spec.path) text = spec.choices.empty() ? "a path" : text + ", or a path";
   constexpr double kMax = std::numeric_limits<double>::max();
   if (spec.low > -kMax && spec.high < kMax)
     text += " from " + number_text(spec.low) + " to " + number_text(spec.high);
   else if (spec.low > -kMax)
     text += " of at least " + number_text(spec.low);
   return text;
+}
+
+bool is_choice(const OptionSpec& spec, const std::string& value) {
+  return std::find(spec.choices.begin(), spec.choices.end(), value) != spec.choices.end();
 }
 
 /// The value as the option's own type. Error{invalid_argument} where it does not fit.
@@ -68,11 +76,9 @@ OptionValue checked(const OptionSpec& spec, OptionValue value) {
   if (const auto* list = std::get_if<std::vector<double>>(&value))
     for (const double x : *list)
       if (!in_range(x)) fail();
-  if (const auto* s = std::get_if<std::string>(&value); s && !spec.choices.empty()) {
-    bool found = false;
-    for (const std::string& choice : spec.choices) found |= choice == *s;
-    if (!found) fail();
-  }
+  if (const auto* s = std::get_if<std::string>(&value);
+      s && !spec.choices.empty() && !spec.path && !is_choice(spec, *s))
+    fail();
   return value;
 }
 
@@ -110,7 +116,11 @@ std::span<const OptionSpec> stage_options(std::string_view stage) { return defin
 
 void set_option(Capture& capture, std::string_view stage, std::string_view name, OptionValue value) {
   const OptionSpec& spec = specification(stage, name);
-  capture.options[std::string(stage)][spec.name] = checked(spec, std::move(value));
+  value = checked(spec, std::move(value));
+  // The next command may run in another folder.
+  if (auto* s = std::get_if<std::string>(&value); s && spec.path && !s->empty() && !is_choice(spec, *s))
+    *s = std::filesystem::absolute(*s).lexically_normal().string();
+  capture.options[std::string(stage)][spec.name] = std::move(value);
 }
 
 void set_option_text(Capture& capture, std::string_view stage, std::string_view name, std::string_view text) {

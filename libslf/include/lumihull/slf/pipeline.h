@@ -31,6 +31,7 @@ struct OptionSpec {
   OptionValue fallback;  ///< the default; its type is the option's type
   double low = -std::numeric_limits<double>::max(), high = std::numeric_limits<double>::max();  ///< numbers' range
   std::vector<std::string> choices = {};  ///< of a string; empty: any
+  bool path = false;  ///< of a string that is none of `choices`: a file or folder; set_option makes it absolute
 };
 
 /// Errors: invalid_argument (no such stage).

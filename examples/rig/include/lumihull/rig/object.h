@@ -42,7 +42,7 @@ struct Object {
 
 /// Objects made by formula, `size` metres along the longest side of their box, `detail` cells along it.
 /// vase: surface of revolution with ridges, hollow neck, handle (genus 1). bust: a glossy, nearly convex head.
-/// statue: a dark figure with its arms akimbo (genus 2). gate: a pale slab with a wide bore, two narrow ones that few
+/// statue: a dark figure with its arms akimbo (genus 3). gate: a pale slab with a wide bore, two narrow ones that few
 /// photographs see through, and one through its length (genus 4). box: twelve triangles, checker. sphere: radius size /
 /// 2, vertices on it to float accuracy, 20 * 4^n triangles.
 Object make_vase(double size, int detail = 100);
