@@ -11,7 +11,6 @@
 namespace lumihull::slf {
 namespace {
 
-constexpr int kUnmixed = 250;            // alpha from which a pixel shows the object alone
 constexpr int kStep = 3, kDiagonal = 4;  // chamfer distance (Borgefors 1986): thirds of a pixel
 
 /// Distance to the nearest pixel whose alpha is below one half, in thirds of a pixel, at most 255. The picture's border
