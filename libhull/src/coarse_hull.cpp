@@ -256,34 +256,9 @@ double CoarseHull::voxel_px(const CoarseView& view) const {
 
 int CoarseHull::margin_px(const CoarseView& view) const { return 3 + int(std::ceil(voxel_px(view))); }
 
-Image CoarseHull::silhouette(const CoarseView& view, int grow) const {
-  Image out(view.mask.width(), view.mask.height(), 1);
-  const Lattice lattice = project(view, grid_.low, grid_.voxel, grid_.n);
-  // A voxel covers a square as wide as its diagonal; overlapping squares leave no gaps.
-  const int reach = int(std::ceil(0.5 * std::sqrt(3.0) * voxel_px(view))) + grow;
-  for (int z = 0; z < grid_.n; ++z)
-    for (int y = 0; y < grid_.n; ++y) {
-      const std::uint8_t* kept =
-          kept_.data() + (std::size_t(z) * std::size_t(grid_.n) + std::size_t(y)) * std::size_t(grid_.n);
-      visit_row(
-          lattice, y, z,
-          [&](int block) {
-            return std::any_of(kept + block * kBlock, kept + (block + 1) * kBlock,
-                               [](std::uint8_t k) { return k != 0; });
-          },
-          [&](int x, float u, float v) {
-            if (!kept[x] || !(u >= 0 && u < float(out.width()) && v >= 0 && v < float(out.height()))) return;
-            out.row<std::uint8_t>(int(v))[int(u)] = 255;
-          });
-    }
-  return grown(out, reach);
-}
-
-Image CoarseHull::depth(const CoarseView& view, int least) const {
-  const int width = view.mask.width(), height = view.mask.height();
-  // One cell of the picture for each voxel's width: every ray through the hull meets voxels' centres in its cell.
-  const float cells_per_px = float(1 / std::max(1.0, voxel_px(view)));
-  Image cells(int(float(width) * cells_per_px) + 1, int(float(height) * cells_per_px) + 1, 1);
+template <class Visit>
+void CoarseHull::visit_kept(const CoarseView& view, int least, Visit&& visit) const {
+  const float width = float(view.mask.width()), height = float(view.mask.height());
   const Lattice lattice = project(view, grid_.low, grid_.voxel, grid_.n);
   for (int z = 0; z < grid_.n; ++z)
     for (int y = 0; y < grid_.n; ++y) {
@@ -296,11 +271,28 @@ Image CoarseHull::depth(const CoarseView& view, int least) const {
             return *std::max_element(k, k + kBlock) >= least;
           },
           [&](int x, float u, float v) {
-            if (kept[x] < least || !(u >= 0 && u < float(width) && v >= 0 && v < float(height))) return;
-            std::uint8_t& cell = cells.row<std::uint8_t>(int(v * cells_per_px))[int(u * cells_per_px)];
-            cell = std::max(cell, kept[x]);
+            if (kept[x] >= least && u >= 0 && u < width && v >= 0 && v < height) visit(kept[x], u, v);
           });
     }
+}
+
+Image CoarseHull::silhouette(const CoarseView& view, int grow) const {
+  Image out(view.mask.width(), view.mask.height(), 1);
+  // A voxel covers a square as wide as its diagonal; overlapping squares leave no gaps.
+  const int reach = int(std::ceil(0.5 * std::sqrt(3.0) * voxel_px(view))) + grow;
+  visit_kept(view, 1, [&](std::uint8_t, float u, float v) { out.row<std::uint8_t>(int(v))[int(u)] = 255; });
+  return grown(out, reach);
+}
+
+Image CoarseHull::depth(const CoarseView& view, int least) const {
+  const int width = view.mask.width(), height = view.mask.height();
+  // One cell of the picture for each voxel's width: every ray through the hull meets voxels' centres in its cell.
+  const float cells_per_px = float(1 / std::max(1.0, voxel_px(view)));
+  Image cells(int(float(width) * cells_per_px) + 1, int(float(height) * cells_per_px) + 1, 1);
+  visit_kept(view, least, [&](std::uint8_t depth, float u, float v) {
+    std::uint8_t& cell = cells.row<std::uint8_t>(int(v * cells_per_px))[int(u * cells_per_px)];
+    cell = std::max(cell, depth);
+  });
   Image out(width, height, 1);
   std::vector<int> column(static_cast<std::size_t>(width));
   for (int x = 0; x < width; ++x) column[std::size_t(x)] = int((float(x) + 0.5f) * cells_per_px);

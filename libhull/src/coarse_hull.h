@@ -53,6 +53,9 @@ class CoarseHull {
   static std::vector<std::uint8_t> vote(std::span<const CoarseView> views, const Grid& grid, double tolerance,
                                         Job& job);
   void measure_depth();
+  /// Calls visit(depth, u, v) for the voxels of at least that depth whose centres lie in the picture, coarse pixels.
+  template <class Visit>
+  void visit_kept(const CoarseView& view, int least, Visit&& visit) const;
 
   Grid grid_;
   /// n³, x fastest; 0: carved; else the voxels to the nearest carved one along any of the 26 ways, at most kDeepest.
