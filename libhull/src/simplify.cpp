@@ -1,67 +1,57 @@
 #include <lumihull/base/error.h>
 #include <lumihull/hull/mesh_check.h>
 #include <lumihull/hull/simplify.h>
-#include <meshoptimizer.h>
 
+#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
+#include <OpenMesh/Tools/Decimater/DecimaterT.hh>
+#include <OpenMesh/Tools/Decimater/ModHausdorffT.hh>
+#include <OpenMesh/Tools/Decimater/ModNormalFlippingT.hh>
+#include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <optional>
 
 namespace lumihull::hull {
 namespace {
 
-/// Drops vertices that no triangle uses.
-Mesh compacted(const Mesh& mesh, const std::vector<unsigned>& indices) {
-  Mesh out;
-  std::vector<std::uint32_t> renumbered(mesh.vertices.size(), ~std::uint32_t(0));
-  for (const unsigned v : indices) renumbered[v] = 0;
-  for (std::size_t v = 0; v < renumbered.size(); ++v)
-    if (renumbered[v] == 0) {
-      renumbered[v] = std::uint32_t(out.vertices.size());
-      out.vertices.push_back(mesh.vertices[v]);
-    }
-  out.triangles.reserve(indices.size() / 3);
-  for (std::size_t i = 0; i < indices.size(); i += 3)
-    out.triangles.push_back({renumbered[indices[i]], renumbered[indices[i + 1]], renumbered[indices[i + 2]]});
+struct Traits : OpenMesh::DefaultTraits {
+  VertexAttributes(OpenMesh::Attributes::Status);
+  EdgeAttributes(OpenMesh::Attributes::Status);
+  HalfedgeAttributes(OpenMesh::Attributes::PrevHalfedge);
+  FaceAttributes(OpenMesh::Attributes::Status | OpenMesh::Attributes::Normal);
+};
+using HalfedgeMesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
+
+/// Throws Error{bad_input} where the triangles are no closed manifold: such a surface has no halfedges, or a border
+/// that collapses would eat away.
+HalfedgeMesh halfedges_of(const Mesh& mesh) {
+  if (const MeshCheck check = check_mesh(mesh, false); !check.manifold || !check.oriented)
+    throw Error(ErrorCode::bad_input, "only a closed, consistently oriented manifold can be simplified", "mesh");
+  HalfedgeMesh out;
+  out.reserve(mesh.vertices.size(), mesh.triangles.size() * 3 / 2, mesh.triangles.size());
+  for (const auto& v : mesh.vertices) out.add_vertex({v.x(), v.y(), v.z()});
+  const auto vertex = [](std::uint32_t v) { return OpenMesh::VertexHandle(int(v)); };
+  for (const auto& t : mesh.triangles) out.add_face(vertex(t[0]), vertex(t[1]), vertex(t[2]));
+  out.update_face_normals();
   return out;
 }
 
-/// One pass of meshoptimizer; nullopt where the result is no longer a closed manifold.
-std::optional<Mesh> collapsed(const Mesh& mesh, std::size_t target, double max_error) {
-  std::vector<unsigned> indices;
-  indices.reserve(3 * mesh.triangles.size());
-  for (const auto& t : mesh.triangles) indices.insert(indices.end(), t.begin(), t.end());
-  const float* positions = mesh.vertices[0].data();
-  const float extent = meshopt_simplifyScale(positions, mesh.vertices.size(), sizeof(Eigen::Vector3f));
-  const float error = max_error > 0 ? float(max_error / extent) : 1.0f;
-  std::vector<unsigned> simplified(indices.size());
-  simplified.resize(meshopt_simplify(simplified.data(), indices.data(), indices.size(), positions, mesh.vertices.size(),
-                                     sizeof(Eigen::Vector3f), 3 * target, error, 0, nullptr));
-  if (simplified.size() < 12) return std::nullopt;
-  Mesh candidate = compacted(mesh, simplified);
-  if (!check_mesh(candidate, false).good()) return std::nullopt;
-  return candidate;
-}
-
-/// Collapses in a different order, by way of more triangles or towards fewer, find a way around a pinch.
-Mesh reduced_to(const Mesh& mesh, std::size_t most, double max_error, Job& job) {
-  Mesh best = mesh;
-  for (std::size_t round = 0; round < 16 && best.triangles.size() > most; ++round) {
-    job.check();
-    const std::size_t target = std::max<std::size_t>(most - round * most / 50, 4);
-    std::optional<Mesh> next = collapsed(best, target, max_error);
-    if (!next) next = collapsed(best, target + (best.triangles.size() - target) / (2 + round), max_error);
-    if (next && next->triangles.size() < best.triangles.size()) best = std::move(*next);
+Mesh mesh_of(const HalfedgeMesh& from) {
+  Mesh out;
+  std::vector<std::uint32_t> renumbered(from.n_vertices(), ~std::uint32_t(0));
+  for (const auto v : from.vertices()) {  // those that were not deleted, in order
+    if (from.is_isolated(v)) continue;
+    renumbered[std::size_t(v.idx())] = std::uint32_t(out.vertices.size());
+    const auto& p = from.point(v);
+    out.vertices.push_back({p[0], p[1], p[2]});
   }
-  return best;
-}
-
-Mesh reduced_within(const Mesh& mesh, double max_error, Job& job) {
-  for (int round = 0; round < 8; ++round, max_error *= 0.8) {
-    job.check();
-    if (std::optional<Mesh> next = collapsed(mesh, 4, max_error)) return std::move(*next);
+  for (const auto f : from.faces()) {
+    std::array<std::uint32_t, 3> t{};
+    int k = 0;
+    for (const auto v : from.fv_range(f)) t[std::size_t(k++)] = renumbered[std::size_t(v.idx())];
+    out.triangles.push_back(t);
   }
-  return mesh;
+  return out;
 }
 
 }  // namespace
@@ -73,8 +63,35 @@ SimplifyResult simplify(const Mesh& mesh, const SimplifyOptions& options, Job& j
   validate(mesh, "mesh");
   SimplifyResult result;
   if (mesh.empty()) return result;
-  result.mesh = options.max_triangles > 0 ? reduced_to(mesh, options.max_triangles, options.max_error, job)
-                                          : reduced_within(mesh, options.max_error, job);
+
+  HalfedgeMesh surface = halfedges_of(mesh);
+  OpenMesh::Decimater::DecimaterT<HalfedgeMesh> decimater(surface);
+  OpenMesh::Decimater::ModQuadricT<HalfedgeMesh>::Handle quadric;
+  decimater.add(quadric);
+  OpenMesh::Decimater::ModNormalFlippingT<HalfedgeMesh>::Handle flipping;
+  decimater.add(flipping);
+  decimater.module(quadric).unset_max_err();  // it orders the collapses; distances are kept by a module of their own
+  OpenMesh::Decimater::ModHausdorffT<HalfedgeMesh>::Handle bound;
+  if (options.max_error > 0) {
+    decimater.add(bound);
+    decimater.module(bound).set_tolerance(options.max_error);
+  }
+  struct Stop : OpenMesh::Decimater::Observer {
+    explicit Stop(const Job& j) : Observer(4096), job(j) {}
+    void notify(std::size_t) override {}
+    bool abort() const override { return job.cancelled(); }
+    const Job& job;
+  } stop(job);
+  decimater.set_observer(&stop);
+  decimater.initialize();
+  if (options.max_triangles > 0 && mesh.triangles.size() > options.max_triangles)
+    decimater.decimate_to_faces(0, options.max_triangles);
+  else if (options.max_triangles == 0)
+    decimater.decimate();
+  job.check();
+  surface.garbage_collection();
+
+  result.mesh = mesh_of(surface);
   result.reached = options.max_triangles == 0 || result.mesh.triangles.size() <= options.max_triangles;
   if (result.mesh.triangles.size() < mesh.triangles.size()) {
     const MeshDistance there = distance(mesh, result.mesh, job), back = distance(result.mesh, mesh, job);

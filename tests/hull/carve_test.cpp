@@ -387,5 +387,24 @@ TEST(Simplify, StaysClosedAndReportsHowFarItMoved) {
   EXPECT_EQ(test::expect_error([&] { simplify(ring.mesh, {}, job); }).code(), ErrorCode::invalid_argument);
 }
 
+TEST(Simplify, ReducesToAFiftiethWithoutAPinch) {
+  const auto views = test::views_around(test::pinhole(240, 240, 284), 30, 4);
+  Job job;
+  const CarveResult ring = carve(views, test::silhouettes_of(test::torus(0.8, 0.25), views, {1, 10}), at(128), job);
+  const SimplifyResult simple = simplify(ring.mesh, {ring.mesh.triangles.size() / 50, 0}, job);
+  EXPECT_TRUE(simple.reached);
+  EXPECT_TRUE(check_mesh(simple.mesh).good());
+  EXPECT_EQ(check_mesh(simple.mesh).euler, 0);
+  EXPECT_LT(simple.moved.rms, ring.grid.voxel);
+}
+
+TEST(Simplify, RefusesWhatIsNoManifold) {
+  Mesh fin{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, -1}}, {{0, 1, 2}, {0, 1, 3}, {0, 1, 4}}};
+  Job job;
+  const Error e = test::expect_error([&] { simplify(fin, {2, 0}, job); });
+  EXPECT_EQ(e.code(), ErrorCode::bad_input);
+  EXPECT_THAT(e.message(), testing::HasSubstr("closed"));
+}
+
 }  // namespace
 }  // namespace lumihull

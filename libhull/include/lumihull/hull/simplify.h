@@ -18,7 +18,7 @@ LUMIHULL_API MeshDistance distance(const Mesh& from, const Mesh& to, Job& job);
 
 struct SimplifyOptions {
   std::size_t max_triangles = 0;  ///< at most so many are aimed at; 0: as few as the error allows
-  double max_error = 0;           ///< world units, by the simplifier's own (quadric) estimate; 0: no bound
+  double max_error = 0;           ///< world units: how far a vertex that goes may end up from the surface; 0: no bound
 };
 
 struct SimplifyResult {
@@ -27,10 +27,10 @@ struct SimplifyResult {
   bool reached = true;  ///< whether max_triangles was reached: keeping the surface manifold comes first
 };
 
-/// Fewer triangles for a closed manifold mesh, which stays closed, manifold and oriented: quadric edge collapses by
-/// meshoptimizer, each result checked; where a collapse pinched the surface, other orders of collapses are tried, and
-/// what was reached without is returned (at worst the mesh as it was). Errors: invalid_argument (neither bound is set,
-/// an error that is negative or not finite), bad_input, cancelled.
+/// Fewer triangles for a manifold mesh, which stays closed, manifold and oriented: OpenMesh's edge collapses in the order
+/// of quadric errors (Garland & Heckbert 1997), none that would pinch the surface or turn a triangle over. Vertices of
+/// the result are vertices of `mesh`. Errors: invalid_argument (neither bound is set, an error that is negative or not
+/// finite), bad_input (a mesh that is no manifold), cancelled.
 LUMIHULL_API SimplifyResult simplify(const Mesh& mesh, const SimplifyOptions& options, Job& job);
 
 }  // namespace lumihull::hull
