@@ -25,9 +25,10 @@ int main(int argc, char** argv) {
   std::string output;
   rig::RigOptions options;
   unsigned threads = 0;
-  bool plain = false, fast = false, no_distortion = false;
+  bool plain = false, fast = false, no_distortion = false, no_noise = false;
   app.add_option("-o,--output", output, "folder to make; must be new or empty")->required();
-  app.add_option("--object", options.object, "vase, bust, statue, gate, box, sphere, or a mesh file (.obj, .ply)")
+  app.add_option("--object", options.object,
+                 "vase, bust, statue, gate, box, sphere, pebble, or a mesh file (.obj, .ply)")
       ->capture_default_str();
   app.add_option("--size", options.size_m, "longest side of the object, m")->capture_default_str();
   app.add_option("--photos", options.photos, "photographs of the object")->capture_default_str();
@@ -37,6 +38,13 @@ int main(int argc, char** argv) {
       ->transform(CLI::CheckedTransformer(std::map<std::string, rig::Path>{
           {"hemisphere", rig::Path::hemisphere}, {"ring", rig::Path::ring}, {"random", rig::Path::random}}));
   app.add_option("--fill", options.fill, "part of the picture's height that the object takes")->capture_default_str();
+  app.add_flag("--matt", options.matt, "the object has no gloss");
+  app.add_flag("--uniform", options.uniform, "the object has one paint all over");
+  std::vector<int> unlit;
+  app.add_option("--unlit", unlit, "the object is R,G,B (0 to 255) in every photograph, whatever the light")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(CLI::Range(0, 255));
   app.add_flag("--blue", options.blue, "a blue enclosure instead of a green one");
   app.add_flag("--pedestal", options.pedestal, "the object stands on a pedestal");
   app.add_flag("--no-distortion", no_distortion, "an ideal lens");
@@ -46,6 +54,10 @@ int main(int argc, char** argv) {
   app.add_option("--quality", options.jpeg_quality, "of the JPEGs, 1 to 100")->capture_default_str();
   app.add_option("--rays", options.photo.rays, "n x n rays a pixel")->capture_default_str();
   app.add_option("--exposure", options.photo.exposure, "brightness")->capture_default_str();
+  app.add_flag("--no-noise", no_noise, "an ideal sensor");
+  app.add_option("--test-views", options.test_views,
+                 "pictures along an arc for judging a renderer, into truth/: free of noise, with camera path and masks")
+      ->capture_default_str();
   app.add_option("--seed", options.seed, "of paint, noise and trajectory")->capture_default_str();
   app.add_flag("--plain", plain, "plain files and P.txt instead of a capture folder; implies --no-distortion");
   app.add_flag("--fast", fast, "trace a third of the size and enlarge; noise at full size");
@@ -57,6 +69,8 @@ int main(int argc, char** argv) {
   }
   options.distortion = !no_distortion && !plain;
   if (fast) options.photo.reduce = 3;
+  if (no_noise) options.photo.full_well = 0;
+  if (unlit.size() == 3) options.unlit = {std::uint8_t(unlit[0]), std::uint8_t(unlit[1]), std::uint8_t(unlit[2])};
 
   lumihull::Job job(
       [](const lumihull::Progress& p) {

@@ -9,30 +9,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// A black, glossy ball in a black room under one lamp: all that a photograph shows is the highlight.
-Scene dark_room(double roughness) {
-  Object ball = make_sphere(.4, 6);
-  ball.material.pattern = Pattern::plain;
-  ball.material.colors[0] = {0, 0, 0};
-  ball.material.grain = 0;
-  ball.material.reflectance = .5f;
-  ball.material.roughness = float(roughness);
-  Scene scene = make_scene(ball, {0, 0, 0}, false, 1);
-  scene.enclosure.ceiling = {0, 0, 0};
-  scene.ambient = {0, 0, 0};
-  scene.lamps.resize(1);
-  scene.lamps[0].radius = .02f;
-  scene.lamps[0].intensity *= .1f;
-  return scene;
-}
-
-/// Where a sphere mirrors the lamp to the eye: there the normal halves the angle between both (Alhazen's problem), by
-/// fixed-point iteration, which contracts for points well outside the sphere.
-Vector3d mirror_point(const Vector3d& center, double radius, const Vector3d& lamp, const Vector3d& eye) {
-  Vector3d p = center + radius * ((lamp - center).normalized() + (eye - center).normalized()).normalized();
-  for (int i = 0; i < 200; ++i) p = center + radius * ((lamp - p).normalized() + (eye - p).normalized()).normalized();
-  return p;
-}
+Scene dark_room(double roughness) { return test::in_the_dark(make_sphere(.4, 6), roughness); }
 
 struct Highlight {
   Vector2d middle{0, 0};
@@ -84,7 +61,7 @@ TEST(Gloss, TheHighlightTakesThePathOfTheMirrorPoint) {
     Photo photo = photographer.photograph(view, options, 1, job);
     const Highlight found = find_highlight(photo.picture);
     ASSERT_GT(found.brightest, .02);
-    const Vector3d expected = mirror_point(center, .2, lamp, view.center());
+    const Vector3d expected = test::sphere_mirror_point(center, .2, lamp, view.center());
     const auto px = view.project(expected);
     ASSERT_TRUE(px);
     // The lobe is slightly lopsided (masking, Fresnel, distance), hence not zero.
@@ -127,6 +104,41 @@ TEST(Gloss, AMattBallHasNone) {
   const Photographer photographer(scene, test::coarse_light(), job);
   const View view = test::view_of(scene, default_camera(120), 0);
   EXPECT_EQ(find_highlight(photographer.photograph(view, test::noiseless(), 1, job).picture).brightest, 0);
+}
+
+TEST(Gloss, TheCeilingsReflectionHasSoftEdgesWhereAsked) {
+  Job job;
+  double steepest[2], mean[2];
+  for (const bool soft : {false, true}) {
+    Scene scene = dark_room(.3);
+    scene.enclosure.ceiling = {1, 1, 1};
+    scene.lamps.clear();
+    scene.objects[0].material.reflectance = .1f;
+    scene.objects[0].material.soft_mirror = soft;
+    const Photographer photographer(scene, test::coarse_light(), job);
+    const Camera camera = default_camera(240);
+    const Vector3d center = scene.center().cast<double>();
+    const View view{camera, look_at(center + Vector3d(.1, 0, .8), center, {0, 1, 0})};
+    PhotoOptions options = test::noiseless();
+    options.exposure = 5;
+    const Photo photo = photographer.photograph(view, options, 1, job);
+    double sum = 0, count = 0, step = 0;
+    const auto light = [&](int x, int y) {
+      return linear_from_srgb(photo.picture.row<std::uint8_t>(y)[3 * x] / 255.f);
+    };
+    for (int y = 0; y < photo.mask.height(); ++y)
+      for (int x = 1; x < photo.mask.width(); ++x) {
+        // Facing the camera, far from the outline, where Fresnel's reflection is steep by itself.
+        if (Vector2d(x - camera.u0, y - camera.v0).norm() > 45) continue;
+        ASSERT_EQ(photo.mask.row<std::uint8_t>(y)[x], 255);
+        sum += light(x, y), count += 1;
+        step = std::max(step, double(std::fabs(light(x, y) - light(x - 1, y))));
+      }
+    steepest[soft] = step, mean[soft] = sum / count;
+  }
+  EXPECT_GT(steepest[0], .1);
+  EXPECT_LT(steepest[1], .35 * steepest[0]);
+  EXPECT_NEAR(mean[1] / mean[0], 1, .1);
 }
 
 }  // namespace

@@ -62,6 +62,7 @@ TEST(RigCapture, TheSameOptionsMakeTheSameBytes) {
   RigOptions o = small();
   o.format = PhotoFormat::png;
   o.photo.reduce = 3;
+  o.test_views = 2;
   make_capture(folder / "a", o, one);
   make_capture(folder / "b", o, two);
   std::size_t compared = 0;
@@ -71,7 +72,8 @@ TEST(RigCapture, TheSameOptionsMakeTheSameBytes) {
     EXPECT_EQ(read_file(entry.path()), read_file(folder / "b" / name)) << name;
     ++compared;
   }
-  EXPECT_EQ(compared, 4u + 2 + 4 + 3);  // photos, enclosure, masks; two cameras.json and mesh.ply
+  // Photographs, enclosure, masks; two cameras.json, mesh.ply, highlights.json; test views, masks, their two files.
+  EXPECT_EQ(compared, 4u + 2 + 4 + 4 + 2 + 2 + 2);
 }
 
 TEST(RigCapture, PlainFilesListTheirMatrices) {
@@ -111,7 +113,8 @@ TEST(RigCapture, OptionsAreChecked) {
   Job job;
   for (const auto& spoil : {+[](RigOptions& o) { o.photos = 0; }, +[](RigOptions& o) { o.width = 3; },
                             +[](RigOptions& o) { o.size_m = NAN; }, +[](RigOptions& o) { o.fill = 2; },
-                            +[](RigOptions& o) { o.jpeg_quality = 0; }, +[](RigOptions& o) { o.object = "nothing"; }}) {
+                            +[](RigOptions& o) { o.jpeg_quality = 0; }, +[](RigOptions& o) { o.test_views = -1; },
+                            +[](RigOptions& o) { o.object = "nothing"; }}) {
     RigOptions o = small();
     spoil(o);
     EXPECT_EQ(test::expect_error([&] { make_capture(folder / "x", o, job); }).code(), ErrorCode::invalid_argument);
@@ -123,7 +126,8 @@ TEST(Trajectory, LooksAtItsTargetFromItsRadius) {
   h.target = {.1, -.2, .3};
   h.radius = 2;
   h.jitter = 0;
-  for (const auto& poses : {hemisphere_trajectory(48, h), ring_trajectory(7, h), random_trajectory(20, h)})
+  for (const auto& poses : {hemisphere_trajectory(48, h), ring_trajectory(7, h), random_trajectory(20, h),
+                            arc_trajectory(9, h, -1), arc_trajectory(1, h, 0)})
     for (const Pose& pose : poses) {
       EXPECT_NEAR((pose.center() - h.target).norm(), 2, 1e-9);
       EXPECT_LT((pose * h.target - Eigen::Vector3d(0, 0, 2)).norm(), 1e-9);
@@ -138,6 +142,26 @@ TEST(Trajectory, LooksAtItsTargetFromItsRadius) {
   EXPECT_EQ(hemisphere_trajectory(601, h).size(), 601u);
   EXPECT_EQ(hemisphere_trajectory(1, h).size(), 1u);
   EXPECT_EQ(test::expect_error([&] { ring_trajectory(0, h); }).code(), ErrorCode::invalid_argument);
+}
+
+TEST(Trajectory, AnArcIsSmoothAndCrossesTheMiddle) {
+  Hemisphere h;
+  h.target = {.1, -.2, .3};
+  h.jitter = 0;
+  const auto poses = arc_trajectory(41, h, .7);
+  ASSERT_EQ(poses.size(), 41u);
+  const auto eye = [&](std::size_t i) { return Eigen::Vector3d(poses[i].center() - h.target); };
+  double length = 0, longest = 0, bend = 0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const double step = (eye(i) - eye(i - 1)).norm();
+    length += step, longest = std::max(longest, step);
+    if (i > 1) bend = std::max(bend, (eye(i) - 2 * eye(i - 1) + eye(i - 2)).norm());
+  }
+  EXPECT_GT(length, 1.5);  // radii
+  EXPECT_LT(longest, 2 * length / 40);
+  EXPECT_LT(bend, .3 * length / 40);
+  EXPECT_NEAR(std::acos(eye(20).z()), (h.phi_first + h.phi_last) / 2, 1e-9);
+  EXPECT_NEAR(std::atan2(eye(20).y(), eye(20).x()), .7, 1e-9);
 }
 
 TEST(Trajectory, FramingFillsTheSmallerSide) {

@@ -29,12 +29,9 @@ TEST(Shapes, AreClosedOrientedAndOfTheSizeAsked) {
     Object object;
     int genus;
   };
-  const Case cases[] = {{make_vase(.6, 60), 1},
-                        {make_bust(.6, 60), 0},
-                        {make_statue(.6, 80), 3},
-                        {make_gate(.6, 80), 4},
-                        {make_box(.6), 0},
-                        {make_sphere(.6, 3), 0}};
+  const Case cases[] = {{make_vase(.6, 60), 1}, {make_bust(.6, 60), 0}, {make_statue(.6, 80), 3},
+                        {make_gate(.6, 80), 4}, {make_box(.6), 0},      {make_sphere(.6, 3), 0},
+                        {make_pebble(.6, 4), 0}};
   for (const auto& [object, genus] : cases) {
     SCOPED_TRACE(object.name);
     EXPECT_EQ(euler_characteristic(object.mesh), 2 - 2 * genus);
@@ -63,6 +60,42 @@ TEST(Shapes, SphereIsOne) {
   const double ball = 4. / 3 * M_PI * .25 * .25 * .25, volume = hull::enclosed_volume(sphere.mesh);
   EXPECT_LT(volume, ball);
   EXPECT_GT(volume, ball * (1 - 1e-3));
+}
+
+TEST(Shapes, PebbleIsItsFormula) {
+  using Eigen::Vector3d;
+  const double size = .6;
+  const Object pebble = make_pebble(size, 5);
+  EXPECT_EQ(pebble.mesh.triangles.size(), 20u << 10);
+  const auto by_area = hull::vertex_normals(pebble.mesh);
+  ASSERT_EQ(pebble.normals.size(), pebble.mesh.vertices.size());
+  std::size_t on_the_hump = 0;
+  for (std::size_t i = 0; i < pebble.normals.size(); ++i) {
+    const Vector3d p = pebble.mesh.vertices[i].cast<double>() / size, n = pebble.normals[i].cast<double>();
+    Vector3d gradient, differences;
+    ASSERT_NEAR(pebble_function(p, &gradient), 0, 5e-6);  // floats hold a place to 6e-8, the gradient is up to 8
+    for (int k = 0; k < 3; ++k) {
+      const Vector3d h = 1e-5 * Vector3d::Unit(k);
+      differences[k] = (pebble_function(p + h) - pebble_function(p - h)) / 2e-5;
+    }
+    ASSERT_LT((gradient - differences).norm(), 1e-6 * gradient.norm());
+    ASSERT_LT((n - differences.normalized()).norm(), 1e-5);
+    ASSERT_GT(n.dot(by_area[i].cast<double>()), .999);
+    // Off the ellipsoid that it is elsewhere.
+    on_the_hump += p.cwiseQuotient(Vector3d(.5, .4, .33)).squaredNorm() - 2 * p.z() / .33 > 1e-3;
+  }
+  EXPECT_GT(on_the_hump, pebble.normals.size() / 20);
+  EXPECT_LT(on_the_hump, pebble.normals.size() / 2);
+  // Convex: a chord's middle lies inside. Points in steps that meet all sides.
+  const std::size_t n = pebble.normals.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vector3d a = pebble.mesh.vertices[i].cast<double>(), b = pebble.mesh.vertices[i * 7919 % n].cast<double>();
+    if (i != i * 7919 % n) {
+      ASSERT_LT(pebble_function((a + b) / (2 * size)), 1e-6);
+    }
+  }
+  EXPECT_EQ(test::expect_error([] { make_pebble(1, 0); }).code(), ErrorCode::invalid_argument);
+  EXPECT_EQ(test::expect_error([] { make_pebble(1, 9); }).code(), ErrorCode::invalid_argument);
 }
 
 class MeshFile : public testing::Test {

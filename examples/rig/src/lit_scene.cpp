@@ -265,6 +265,13 @@ Vector3f LitScene::room_radiance(const RoomHit& hit) const {
   return room_.paint(hit).cwiseProduct(light);
 }
 
+Vector3f LitScene::blurred_room(const Vector3f& from, const Vector3f& way, float blur) const {
+  const float share = room_.ceiling_share(from, way, blur);
+  Vector3f radiance = share * room_.enclosure().ceiling;
+  if (share < 1) radiance += (1 - share) * room_radiance(room_.hit_below_ceiling(from, way));
+  return radiance;
+}
+
 Vector3f LitScene::base_color(const Part& part, const Hit& hit, const Vector3f& point) const {
   if (part.texture.empty()) return pattern_color(part.material, (point - part.foot) / part.size);
   const auto& uv = part.uv[hit.triangle - part.first_triangle];
@@ -298,6 +305,7 @@ Vector3f LitScene::object_radiance(const Ray& ray, const Hit& hit) const {
   }
   const Part& part = parts_[object_of_[hit.triangle]];
   const Material& m = part.material;
+  if (m.unlit) return m.colors[0];
   const float mirrored = mirror(m, cos_v);
   Vector3f radiance = (1 - mirrored) * base_color(part, hit, point).cwiseProduct(light);
   const Vector3f start = point + offset_ * normal;
@@ -313,7 +321,8 @@ Vector3f LitScene::object_radiance(const Ray& ray, const Hit& hit) const {
     if (rays_->occluded({start, away}))
       radiance += mirrored * .3f * light.cwiseProduct(m.colors[0]);
     else if (room_.contains(start))
-      radiance += mirrored * room_radiance(room_.hit(start, away));
+      radiance += mirrored * (m.soft_mirror ? blurred_room(start, away, 2 * m.roughness * m.roughness)
+                                            : room_radiance(room_.hit(start, away)));
   }
   return radiance;
 }

@@ -52,6 +52,9 @@ class LitScene {
   Eigen::Vector3f lamps_at(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, int rays,
                            std::uint64_t turn) const;
   Eigen::Vector3f base_color(const Part& part, const hull::Hit& hit, const Eigen::Vector3f& point) const;
+  /// What a mirror shows whose reflections turn by up to `blur` (sine): the ceiling's bright edge is softened, the only
+  /// one with much contrast.
+  Eigen::Vector3f blurred_room(const Eigen::Vector3f& from, const Eigen::Vector3f& way, float blur) const;
   bool blocked(const Eigen::Vector3f& point, const Eigen::Vector3f& way) const;
 
   Room room_;

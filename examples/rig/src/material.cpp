@@ -71,6 +71,13 @@ Vector3f pattern_color(const Material& m, const Vector3f& q) {
       color = lerp(m.colors[0], m.colors[1], std::clamp(.85f * smoothstep(.35f, 1.f, vein) + .3f * cloud, 0.f, 1.f));
       break;
     }
+    case Pattern::patches: {
+      const float island = fractal_noise(q * 6 + Vector3f(2, 5, 1), 2, 12);
+      const float spot = fractal_noise(q * 9 + Vector3f(7, 2, 4), 2, 13);
+      color = lerp(m.colors[0], m.colors[1], smoothstep(-.01f, .05f, island));
+      color = lerp(color, m.colors[2], smoothstep(.12f, .18f, spot));
+      break;
+    }
     case Pattern::pottery:
       color = pottery(m, q);
       break;

@@ -47,11 +47,12 @@ Object object_by_name(const std::string& name, double size) {
   if (name == "gate") return make_gate(size);
   if (name == "box") return make_box(size);
   if (name == "sphere") return make_sphere(size);
+  if (name == "pebble") return make_pebble(size);
   const fs::path file = name;
   const std::string extension = file.extension().string();
   if (extension != ".obj" && extension != ".ply")
     throw Error(ErrorCode::invalid_argument,
-                "expected vase, bust, statue, gate, box, sphere, or a mesh file (.obj, .ply)", name);
+                "expected vase, bust, statue, gate, box, sphere, pebble, or a mesh file (.obj, .ply)", name);
   const bool obj = extension == ".obj";
   fs::path texture = file;
   texture.replace_extension(".png");

@@ -8,59 +8,89 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
 #include "noise.h"
+#include "truth.h"
 
 namespace lumihull::rig {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 namespace {
+
+std::vector<std::string> names(const char* prefix, int n) {
+  std::vector<std::string> result;
+  for (int i = 0; i < n; ++i) {
+    char name[32];
+    std::snprintf(name, sizeof name, "%s%04d", prefix, i + 1);
+    result.push_back(name);
+  }
+  return result;
+}
 
 /// Everything that is decided before the first photograph is taken.
 struct Session {
   Scene scene;
   Camera camera;
-  std::vector<Pose> shots, empty_shots;
+  NamedShots shots, empty_shots, test_views;
 };
+
+Object object_of(const RigOptions& o) {
+  Object object = object_by_name(o.object, o.size_m);
+  Material& m = object.material;
+  if (o.matt) m.reflectance = 0;
+  if (o.unlit) {
+    for (int c = 0; c < 3; ++c)
+      m.colors[0][c] = linear_from_srgb(float((*o.unlit)[std::size_t(c)]) / 255) / float(o.photo.exposure);
+    m.unlit = true;
+  }
+  if (o.uniform) {
+    m.pattern = Pattern::plain;
+    m.grain = 0;
+    object.texture = Image();
+    object.uv.clear();
+  }
+  return object;
+}
 
 Session plan(const RigOptions& o) {
   const auto fail = [](const char* what) { throw Error(ErrorCode::invalid_argument, what, "rig"); };
   if (o.photos < 1 || o.photos > 100'000) fail("photos must be from 1 to 100000");
   if (o.empty_photos < 0 || o.empty_photos > 100'000) fail("empty photos must be from 0 to 100000");
   if (o.width < 16 || o.width > 20'000) fail("width must be from 16 to 20000 px");
+  if (o.test_views < 0 || o.test_views > 100'000) fail("test views must be from 0 to 100000");
   if (!(o.fill > .05 && o.fill <= 1)) fail("fill must be above 0.05, at most 1");
   if (o.jpeg_quality < 1 || o.jpeg_quality > 100) fail("JPEG quality must be from 1 to 100");
   if (!(o.size_m > 1e-3 && o.size_m < 1e3)) fail("size must be from 0.001 to 1000 m");
 
   Session session;
-  session.scene = make_scene(object_by_name(o.object, o.size_m), o.blue ? kBluePaint : kGreenPaint, o.pedestal, o.seed);
+  session.scene = make_scene(object_of(o), o.blue ? kBluePaint : kGreenPaint, o.pedestal, o.seed);
   session.camera = default_camera(o.width, o.distortion);
   Hemisphere around;
   around.target = session.scene.center().cast<double>();
   around.radius = framing_distance(session.camera, session.scene.radius(), o.fill);
   around.seed = mix(o.seed, 1);
-  const auto poses = [&](int n) {
-    if (n == 0) return std::vector<Pose>();
-    if (o.path == Path::ring) {
-      Hemisphere ring = around;
-      ring.phi_last = 1.2;
-      return ring_trajectory(n, ring);
-    }
-    return o.path == Path::random ? random_trajectory(n, around) : hemisphere_trajectory(n, around);
+  if (o.path == Path::ring) around.phi_first = around.phi_last = 1.2;
+  const auto shots = [&](int n, const char* prefix) {
+    NamedShots named;
+    if (n == 0) return named;
+    named.cam_from_world = o.path == Path::hemisphere ? hemisphere_trajectory(n, around)
+                           : o.path == Path::ring     ? ring_trajectory(n, around)
+                                                      : random_trajectory(n, around);
+    named.names = names(prefix, n);
+    return named;
   };
-  session.shots = poses(o.photos);
+  session.shots = shots(o.photos, "");
   around.seed = mix(o.seed, 2);
-  session.empty_shots = poses(o.empty_photos);
+  session.empty_shots = shots(o.empty_photos, "empty_");
+  if (o.test_views > 0) {
+    // Where the brightest lamp's highlight is seen all the way.
+    const Eigen::Vector3f to_lamp = session.scene.lamps[0].position - session.scene.center();
+    around.jitter = 0;
+    session.test_views = {names("test_", o.test_views),
+                          arc_trajectory(o.test_views, around, std::atan2(to_lamp.y(), to_lamp.x()))};
+  }
   return session;
-}
-
-std::string name_of(const char* prefix, std::size_t i) {
-  char name[32];
-  std::snprintf(name, sizeof name, "%s%04zu", prefix, i + 1);
-  return name;
 }
 
 /// The robot takes a picture every ten seconds, beginning on a fixed morning: the clock is part of the truth, not of
@@ -72,64 +102,31 @@ std::string clock(std::size_t shot) {
   return text;
 }
 
-Json numbers(const Eigen::Vector3f& v) { return Json::array({v.x(), v.y(), v.z()}); }
-
-void write_truth(const fs::path& folder, const Session& session, const std::vector<std::string>& names) {
-  Json json;
-  json["format"] = "lumihull-rig-truth";
-  json["version"] = 1;
-  json["unit"] = "m";
-  const Camera& c = session.camera;
-  json["camera"] = {{"width", c.width}, {"height", c.height}, {"f", c.f},   {"s", c.s},
-                    {"skew", c.skew},   {"u0", c.u0},         {"v0", c.v0}, {"k1", c.k1},
-                    {"k2", c.k2},       {"k3", c.k3},         {"p1", c.p1}, {"p2", c.p2}};
-  json["object"] = {{"name", session.scene.objects[0].name}};
-  const auto [low, high] = bounding_box(session.scene.objects[0].mesh);
-  json["object"]["low"] = numbers(low);
-  json["object"]["high"] = numbers(high);
-  json["lamps"] = Json::array();
-  for (const Lamp& lamp : session.scene.lamps)
-    json["lamps"].push_back(
-        {{"position", numbers(lamp.position)}, {"radius", lamp.radius}, {"intensity", numbers(lamp.intensity)}});
-  json["views"] = Json::array();
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    const auto m = session.shots[i].matrix();
-    Json rows = Json::array();
-    for (int r = 0; r < 3; ++r) rows.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
-    json["views"].push_back({{"name", names[i]}, {"cam_from_world", rows}});
-  }
-  write_file(folder / "cameras.json", json.dump(1) + "\n");
-  hull::write_mesh(folder / "mesh.ply", session.scene.objects[0].mesh);
-}
-
-/// Takes all photographs of one kind; truth masks where `masks` names a folder.
-std::vector<std::string> take(const Session& session, const Scene& scene, const std::vector<Pose>& shots,
-                              const RigOptions& o, const fs::path& folder, const char* prefix, const fs::path& masks,
+/// Takes all photographs of one kind, and masks where `masks` names a folder; the files' names.
+std::vector<std::string> take(const Photographer& photographer, const Camera& camera, const NamedShots& shots,
+                              const RigOptions& o, const char* what, const fs::path& folder, const fs::path& masks,
                               std::uint64_t seed, Job& job) {
-  std::vector<std::string> files(shots.size());
-  if (shots.empty()) return files;
-  const Photographer photographer(scene, o.light, job);
-  job.begin(masks.empty() ? "photographs of the empty enclosure" : "photographs", shots.size());
+  std::vector<std::string> files(shots.names.size());
+  job.begin(what, files.size());
   parallel_for(
-      job, shots.size(),
+      job, files.size(),
       [&](std::size_t i) {
         Job alone({}, 1);  // one photograph a thread: encoding is serial, so this keeps all cores busy
-        const Photo photo = photographer.photograph({session.camera, shots[i]}, o.photo, mix(seed, i), alone);
-        const std::string name = name_of(prefix, i);
+        const Photo photo = photographer.photograph({camera, shots.cam_from_world[i]}, o.photo, mix(seed, i), alone);
         if (o.format == PhotoFormat::png) {
-          files[i] = name + ".png";
+          files[i] = shots.names[i] + ".png";
           write_png(folder / files[i], photo.picture);
         } else {
-          files[i] = name + ".jpg";
+          files[i] = shots.names[i] + ".jpg";
           ExifTags tags;
           tags.time = clock(i);
           tags.focal_length_mm = kFocalLength_mm;
           tags.sensor_width_mm = kSensorWidth_mm;
-          tags.width = session.camera.width;
-          tags.height = session.camera.height;
+          tags.width = camera.width;
+          tags.height = camera.height;
           write_file(folder / files[i], with_exif(encode_jpeg(photo.picture, o.jpeg_quality), tags));
         }
-        if (!masks.empty() && o.truth_masks) write_file(masks / (name + ".png"), encode_mask(photo.mask));
+        if (!masks.empty()) write_file(masks / (shots.names[i] + ".png"), encode_mask(photo.mask));
       },
       true);
   job.end();
@@ -138,19 +135,39 @@ std::vector<std::string> take(const Session& session, const Scene& scene, const 
 
 struct Taken {
   Session session;
-  std::vector<std::string> names, files, empty_files;  ///< files within photos/ and enclosure/
+  std::vector<std::string> files, empty_files;  ///< within photos/ and enclosure/
 };
 
 Taken take_all(const fs::path& folder, const RigOptions& o, Job& job) {
   Taken taken;
   taken.session = plan(o);
   const Session& s = taken.session;
-  for (const char* sub : {"photos", "enclosure", "truth/masks"}) fs::create_directories(folder / sub);
-  taken.empty_files =
-      take(s, s.scene.emptied(), s.empty_shots, o, folder / "enclosure", "empty_", {}, mix(o.seed, 4), job);
-  taken.files = take(s, s.scene, s.shots, o, folder / "photos", "", folder / "truth" / "masks", mix(o.seed, 3), job);
-  for (std::size_t i = 0; i < taken.files.size(); ++i) taken.names.push_back(name_of("", i));
-  write_truth(folder / "truth", s, taken.names);
+  const fs::path truth = folder / "truth";
+  for (const fs::path& sub : {folder / "photos", folder / "enclosure", truth / "masks"}) fs::create_directories(sub);
+  if (o.empty_photos > 0) {
+    const Photographer photographer(s.scene.emptied(), o.light, job);
+    taken.empty_files = take(photographer, s.camera, s.empty_shots, o, "photographs of the empty enclosure",
+                             folder / "enclosure", {}, mix(o.seed, 4), job);
+  }
+  const Photographer photographer(s.scene, o.light, job);
+  taken.files = take(photographer, s.camera, s.shots, o, "photographs", folder / "photos",
+                     o.truth_masks ? truth / "masks" : fs::path(), mix(o.seed, 3), job);
+  write_camera_truth(truth / "cameras.json", s.scene, s.camera, s.shots);
+  hull::write_mesh(truth / "mesh.ply", s.scene.objects[0].mesh);
+  const HighlightFinder finder(s.scene);
+  if (finder.any()) write_highlights(truth / "highlights.json", finder, s.camera, s.shots, o.photo.exposure, job);
+  if (o.test_views > 0) {
+    RigOptions exact = o;
+    exact.format = PhotoFormat::png;
+    exact.photo.full_well = 0;
+    exact.photo.reduce = 1;
+    fs::create_directories(truth / "test_views" / "masks");
+    take(photographer, s.camera, s.test_views, exact, "test views", truth / "test_views",
+         truth / "test_views" / "masks", 0, job);
+    write_camera_path(truth / "test_views.json", s.camera, s.test_views);
+    if (finder.any())
+      write_highlights(truth / "test_highlights.json", finder, s.camera, s.test_views, o.photo.exposure, job);
+  }
   return taken;
 }
 
@@ -164,15 +181,15 @@ Capture make_capture(const fs::path& folder, const RigOptions& options, Job& job
   capture.background_rgb = {255, 255, 255};
   for (std::size_t i = 0; i < taken.files.size(); ++i) {
     Shot shot;
-    shot.name = taken.names[i];
+    shot.name = taken.session.shots.names[i];
     shot.file = "photos/" + taken.files[i];
-    shot.cam_from_world = taken.session.shots[i];
+    shot.cam_from_world = taken.session.shots.cam_from_world[i];
     if (options.format == PhotoFormat::jpeg) shot.time = read_image_info(folder / shot.file).time;
     capture.shots.push_back(std::move(shot));
   }
   for (std::size_t i = 0; i < taken.empty_files.size(); ++i) {
     Shot shot;
-    shot.name = name_of("empty_", i);
+    shot.name = taken.session.empty_shots.names[i];
     shot.file = "enclosure/" + taken.empty_files[i];
     capture.enclosure.push_back(std::move(shot));
   }
@@ -190,7 +207,8 @@ void make_photographs(const fs::path& folder, const RigOptions& options, Job& jo
   const Taken taken = take_all(folder, options, job);
   std::string listing;
   for (std::size_t i = 0; i < taken.files.size(); ++i) {
-    const Eigen::Matrix<double, 3, 4> p = taken.session.camera.matrix() * taken.session.shots[i].matrix();
+    const Eigen::Matrix<double, 3, 4> p =
+        taken.session.camera.matrix() * taken.session.shots.cam_from_world[i].matrix();
     listing += "photos/" + taken.files[i];
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 4; ++c) {

@@ -2,6 +2,7 @@
 
 #include <lumihull/base/error.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -70,15 +71,40 @@ RoomHit Room::hit(const Vector3f& o, const Vector3f& d) const {
   };
   if (d.z() < 0) meet(kFloor, -o.z() / d.z(), Vector3f::UnitZ());
   if (d.z() > 0) meet(kCeiling, (enclosure_.height - o.z()) / d.z(), -Vector3f::UnitZ());
+  panel_hit(o, d, out);
+  out.point = o + out.t * d;
+  return out;
+}
+
+RoomHit Room::hit_below_ceiling(const Vector3f& o, const Vector3f& d) const {
+  RoomHit out = hit(o, d);
+  if (out.surface != kCeiling) return out;
+  out.t = INFINITY;
+  panel_hit(o, d, out);
+  if (out.surface == kCeiling) return hit(o, d);  // straight up: no wall that way
+  out.point = o + out.t * d;
+  out.point.z() = enclosure_.height;
+  return out;
+}
+
+void Room::panel_hit(const Vector3f& o, const Vector3f& d, RoomHit& out) const {
   for (int i = 0; i < enclosure_.panels; ++i) {
     const Vector3f& n = normals_[std::size_t(i)];
     const float towards = -n.dot(d);
     if (towards <= 0) continue;
     const float t = (enclosure_.radius + n.dot(o)) / towards;
-    if (t < out.t) meet(kPanels + i, t, n);
+    if (t < out.t) out.surface = kPanels + i, out.t = t, out.normal = n;
   }
-  out.point = o + out.t * d;
-  return out;
+}
+
+float Room::ceiling_share(const Vector3f& o, const Vector3f& d, float blur) const {
+  float share = 1;
+  for (const Vector3f& n : normals_) {
+    // The plane through the eye and the ceiling's edge on this panel; its normal points to the ceiling.
+    const Vector3f edge(-n.y(), n.x(), 0), to_edge = Vector3f(0, 0, enclosure_.height) - enclosure_.radius * n - o;
+    share *= smoothstep(-blur, blur, d.dot(edge.cross(to_edge).normalized()));
+  }
+  return share;
 }
 
 Vector3f Room::paint(const RoomHit& at) const {

@@ -29,6 +29,11 @@ class Room {
 
   /// From a point inside; direction of any length.
   RoomHit hit(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
+  /// How much of a look around `direction` (unit length) sees the ceiling, from 0 to 1: it fades from -blur to blur,
+  /// the sine of the angle to the ceiling's edge.
+  float ceiling_share(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float blur) const;
+  /// Like hit, but of a wall without end instead of the ceiling: there its place is its upper edge.
+  RoomHit hit_below_ceiling(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
   /// Whether the pedestal stands between origin and origin + direction.
   bool pedestal_between(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
 
@@ -40,6 +45,7 @@ class Room {
   const Eigen::Vector3f& panel_normal(int i) const { return normals_[std::size_t(i)]; }
 
  private:
+  void panel_hit(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, RoomHit& out) const;
   bool pedestal_hit(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, RoomHit& out) const;
 
   Enclosure enclosure_;

@@ -97,4 +97,15 @@ std::vector<Pose> random_trajectory(int n, const Hemisphere& h) {
   return poses;
 }
 
+std::vector<Pose> arc_trajectory(int n, const Hemisphere& h, double theta_middle) {
+  check(n, h);
+  std::vector<Pose> poses;
+  for (int i = 0; i < n; ++i) {
+    const double t = n > 1 ? double(i) / (n - 1) : .5;
+    const double phi = (h.phi_first + h.phi_last) / 2 + (h.phi_last - h.phi_first) / 4 * std::sin(2 * kPi * t);
+    poses.push_back(shot_at(h, i, phi, theta_middle + 2 * kPi / 3 * (t - .5)));
+  }
+  return poses;
+}
+
 }  // namespace lumihull::rig

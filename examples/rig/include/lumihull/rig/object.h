@@ -17,6 +17,7 @@ enum class Pattern : std::uint8_t {
   checker,  ///< cubes of 1/10 of the object's size, colors[0] and [1]
   stripes,  ///< wavy horizontal stripes of colors[0] and [1]
   marble,   ///< colors[0] with veins of [1]
+  patches,  ///< colors[0] with islands of [1] and spots of [2], edges about 1/100 of the object's size soft
   pottery,  ///< colors[0] with painted bands and zigzags of [1] and [2]
 };
 
@@ -28,6 +29,8 @@ struct Material {
   float grain = 0.15f;       ///< strength of fine noise on the colour, 0 … 1
   float reflectance = .04f;  ///< mirror reflectance at normal incidence; 0: matt, .04: glaze, .6: metal
   float roughness = .25f;    ///< GGX: alpha = roughness²; 0.05 … 1
+  bool soft_mirror = false;  ///< the ceiling's reflection has soft edges as roughness asks; else sharp
+  bool unlit = false;        ///< radiance is colors[0] (may be above 1) whatever the light: no pattern, shading, gloss
 };
 
 /// A thing to be photographed. z is up; it stands on z = 0, its axis through the origin; metres.
@@ -52,14 +55,21 @@ Object make_gate(double size, int detail = 100);
 Object make_box(double size);
 Object make_sphere(double size, int subdivisions = 6);
 
+/// A pebble: convex, smooth, glossy, in soft patches of moderate contrast; 20 * 4^n triangles (n from 1 to 8), vertices
+/// and normals by the formula to float accuracy.
+Object make_pebble(double size, int subdivisions = 6);
+/// The pebble's formula for size 1: a convex function, twice continuously differentiable, zero on the surface, negative
+/// inside. The long axis goes from x = -1/2 to 1/2, the foot is the origin. gradient (outwards) if wanted.
+double pebble_function(const Eigen::Vector3d& p, Eigen::Vector3d* gradient = nullptr);
+
 /// Reads a mesh (PLY, OBJ), makes it stand on z = 0 (`y_up`: the file's y axis is up) and scales it to `size` metres.
 /// An OBJ file's texture coordinates are read where a `texture` picture is given.
 /// Errors: those of hull::read_mesh and read_image; bad_input naming file and line where texture coordinates are
 /// missing, not finite or indices are out of range.
 Object read_object(const std::filesystem::path& mesh, const std::filesystem::path& texture, double size, bool y_up);
 
-/// By name ("vase", "bust", "statue", "gate", "box", "sphere") or a mesh file (y up for OBJ, z up for PLY; a PNG of the
-/// same name beside an OBJ is its texture). Error{invalid_argument} for a name that is neither.
+/// By name ("vase", "bust", "statue", "gate", "box", "sphere", "pebble") or a mesh file (y up for OBJ, z up for PLY; a
+/// PNG of the same name beside an OBJ is its texture). Error{invalid_argument} for a name that is neither.
 Object object_by_name(const std::string& name, double size);
 
 /// The object's bounding box in its mesh: {low, high}; undefined for an empty mesh.

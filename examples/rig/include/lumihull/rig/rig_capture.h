@@ -4,8 +4,10 @@
 #include <lumihull/base/job.h>
 #include <lumihull/rig/photographer.h>
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 namespace lumihull::rig {
@@ -17,7 +19,11 @@ enum class PhotoFormat : std::uint8_t { jpeg, png };
 struct RigOptions {
   std::string object = "vase";  ///< a name that object_by_name knows, or a mesh file
   double size_m = 0.6;          ///< of the object's longest side
-  bool blue = false;            ///< paint the room blue instead of green
+  bool matt = false;            ///< no gloss: the mirror reflectance is 0
+  bool uniform = false;         ///< the material's first colour all over, no pattern, no grain, no texture
+  /// The object has this colour (8-bit sRGB) in every photograph, whatever the light; without noise, exactly.
+  std::optional<std::array<std::uint8_t, 3>> unlit;
+  bool blue = false;  ///< paint the room blue instead of green
   bool pedestal = false;
   int photos = 48;         ///< 1 … 100,000
   int empty_photos = 8;    ///< of the enclosure without the object
@@ -28,14 +34,17 @@ struct RigOptions {
   PhotoFormat format = PhotoFormat::jpeg;
   int jpeg_quality = 93;
   bool truth_masks = true;
+  int test_views = 0;  ///< pictures along an arc, beside the capture: what a renderer should make of it; 0 … 100,000
   std::uint64_t seed = 1;
   LightOptions light;
   PhotoOptions photo;
 };
 
 /// Photographs an object and writes a capture folder: photos/, enclosure/, known cameras, unit metres, white
-/// background. The truth goes into `truth/` within it, where no stage looks: cameras.json, masks/, mesh.ply. Errors:
-/// invalid_argument (options, folder in use), io, cancelled.
+/// background. The truth goes into `truth/` within it, where no stage looks: cameras.json, masks/, mesh.ply and, of a
+/// glossy object, highlights.json. With test_views: test_views.json (a camera path, "lumihull-camera-path"),
+/// test_views/NAME.png and test_views/masks/NAME.png (free of noise, each pixel traced), test_highlights.json.
+/// Errors: invalid_argument (options, folder in use), io, cancelled.
 Capture make_capture(const std::filesystem::path& folder, const RigOptions& options, Job& job);
 
 /// The same as plain files for importers: photos/, enclosure/, P.txt ("photos/NAME p11 … p34" a line; the pixel

@@ -33,5 +33,9 @@ std::vector<Pose> hemisphere_trajectory(int n, const Hemisphere& options);
 std::vector<Pose> ring_trajectory(int n, const Hemisphere& options);
 /// `n` shots uniform over the part of the sphere between phi_first and phi_last, rolled by any angle.
 std::vector<Pose> random_trajectory(int n, const Hemisphere& options);
+/// `n` shots along a smooth arc as a hand would lead the camera: azimuth evenly over 120° around `theta_middle`, polar
+/// angle down and up again through the middle half of phi_first … phi_last; seen from nearby by the trajectories above,
+/// from nowhere on it exactly. jitter counts as for them.
+std::vector<Pose> arc_trajectory(int n, const Hemisphere& options, double theta_middle);
 
 }  // namespace lumihull::rig
