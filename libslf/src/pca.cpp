@@ -14,11 +14,6 @@ constexpr double kVanishing = 1e-7;  // σ_k / σ_1: what rounding to float leav
 constexpr int kMaxDegree = 12;       // of the filter
 constexpr double kMaxSpread = 13.8;  // ln 1e6: how differently one filter may amplify two wanted vectors
 
-struct Pairs {
-  Eigen::VectorXd values;   // falling
-  Eigen::MatrixXd vectors;  // s x count
-};
-
 /// Degree of the filter for wanted Ritz values between `lowest` and `highest`, damping [0, cut]. A polynomial that
 /// amplifies the first far more than the last would drown the last in the rounding of the first.
 int filter_degree(double highest, double lowest, double cut) {
@@ -27,12 +22,13 @@ int filter_degree(double highest, double lowest, double cut) {
   return spread * kMaxDegree <= kMaxSpread ? kMaxDegree : std::max(1, int(kMaxSpread / spread));
 }
 
-/// The `count` largest eigenpairs of the symmetric positive semidefinite C (s x s): orthogonal iteration with
-/// Rayleigh-Ritz, each step a Chebyshev polynomial of C instead of C (Zhou, Saad, Tiago & Chelikowsky 2006), and
-/// Hotelling's deflation of the leading pairs once they are found, which lets the polynomial's degree rise.
-Pairs largest_eigenpairs(Eigen::MatrixXd c, Eigen::Index count, std::uint64_t seed) {
+/// The eigenvectors (s x count) of the `count` largest eigenvalues, 0 where those vanish, of the symmetric positive
+/// semidefinite C (s x s): orthogonal iteration with Rayleigh-Ritz, each step a Chebyshev polynomial of C instead of C
+/// (Zhou, Saad, Tiago & Chelikowsky 2006), and Hotelling's deflation of the leading pairs once they are found, which
+/// lets the polynomial's degree rise.
+Eigen::MatrixXd largest_eigenvectors(Eigen::MatrixXd c, Eigen::Index count, std::uint64_t seed) {
   const Eigen::Index s = c.rows();
-  Pairs found{Eigen::VectorXd::Zero(count), Eigen::MatrixXd::Zero(s, count)};
+  Eigen::MatrixXd found = Eigen::MatrixXd::Zero(s, count);
   const Eigen::Index width = std::min(s, count + kGuards);
   Eigen::MatrixXd v(s, width), cv, previous, next;
   for (Eigen::Index i = 0; i < v.size(); ++i) v.data()[i] = factor::uniform(seed) - 0.5;
@@ -48,19 +44,16 @@ Pairs largest_eigenpairs(Eigen::MatrixXd c, Eigen::Index count, std::uint64_t se
     const Eigen::MatrixXd turn = ritz.eigenvectors().rowwise().reverse();
     v = (v * turn).eval();
     cv = (cv * turn).eval();
-    if (iteration == 0) largest = theta[0];
+    largest = std::max(largest, theta[0]);
 
     // Leading pairs that are found; at the last iteration all are taken as they are.
     Eigen::Index ready = 0;
-    while (done + ready < count &&
-           ((cv.col(ready) - theta[ready] * v.col(ready)).norm() <= kResidual * std::max(largest, theta[0]) ||
-            iteration == kIterations || width == s))
+    while (done + ready < count && ((cv.col(ready) - theta[ready] * v.col(ready)).norm() <= kResidual * largest ||
+                                    iteration == kIterations || width == s))
       ++ready;
-    largest = std::max(largest, theta[0]);
     for (Eigen::Index k = 0; k < ready; ++k, ++done) {
       if (theta[k] <= kVanishing * kVanishing * largest) return found;  // the rest is zero
-      found.values[done] = theta[k];
-      found.vectors.col(done) = v.col(k);
+      found.col(done) = v.col(k);
       c.noalias() -= theta[k] * v.col(k) * v.col(k).transpose();
     }
     if (done == count) break;
@@ -106,12 +99,12 @@ Factors pca(const Eigen::Ref<const Eigen::MatrixXf>& a, int terms, std::uint64_t
     else
       gram.selfadjointView<Eigen::Lower>().rankUpdate(x);
     gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
-    const Pairs pairs = largest_eigenpairs(std::move(gram), rank, seed);
+    const Eigen::MatrixXd vectors = largest_eigenvectors(std::move(gram), rank, seed);
     // Aᵀ turns left singular vectors into right ones; where their values are small, less exactly orthogonal.
     if (tall)
-      view.leftCols(rank) = pairs.vectors;
+      view.leftCols(rank) = vectors;
     else
-      view.leftCols(rank).noalias() = x.transpose() * pairs.vectors;
+      view.leftCols(rank).noalias() = x.transpose() * vectors;
     factor::orthonormalize(view);
     surface.noalias() = scale * (x * view);
   }
