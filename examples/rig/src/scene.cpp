@@ -44,7 +44,7 @@ Scene make_scene(Object object, const Vector3f& paint, bool pedestal, std::uint6
   if (pedestal) {
     float foot = 0;
     for (const Vector3f& v : scene.objects[0].mesh.vertices) foot = std::max(foot, v.head<2>().norm());
-    room.pedestal_radius = 1.25f * foot;
+    room.pedestal_radius = scene.objects[0].stand > 0 ? scene.objects[0].stand : 1.25f * foot;
     room.pedestal_height = 1.2f * r;
     for (Vector3f& v : scene.objects[0].mesh.vertices) v.z() += room.pedestal_height;
   }

@@ -41,6 +41,7 @@ struct Object {
   std::vector<std::array<Eigen::Vector2f, 3>> uv;  ///< one a triangle's corner, v upwards; empty: no texture
   Image texture;                                   ///< 8-bit sRGB, 3 channels, or empty: `material.pattern`
   Material material;
+  float stand = 0;  ///< radius of the pedestal that suits it, m; 0: a quarter wider than the object
 };
 
 /// Objects made by formula, `size` metres along the longest side of their box, `detail` cells along it.
