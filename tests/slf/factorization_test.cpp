@@ -335,9 +335,8 @@ TEST(LowRank, RecoversTheMissingEntriesFromThirtyPercent) {
 }
 
 TEST(LowRank, WhereTermsRunAwayAFadingRidgeBringsThemBack) {
-  int runs = 0;
-  for (unsigned seed = 0; seed < 200; ++seed, ++runs) {  // with the first fit alone, some of these fail
-    const Scene s = scene(seed, 0, 120, 30, 4, 0.3);
+  for (unsigned seed = 0; seed < 200; ++seed) {  // the first fit alone fails in eight of these
+    const Scene s = scene(seed, 0, 192, 48, 4, 0.2);
     EXPECT_LT(error_where(s, slf::low_rank(s.truth, s.weights, 4, exact(), seed), 4, true), 1e-3) << seed;
   }
 }
