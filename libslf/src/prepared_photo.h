@@ -16,9 +16,9 @@ struct EdgeOptions {
   float edge_alpha = 0.5f;  ///< pixels of a softer mask take the colour of the nearest one beyond it
 };
 
-/// A photograph ready for blending: sRGB with a weight of 1 … 255 in the fourth byte. The eroded rim, pixels softer than
-/// edge_alpha and all outside take the colour of the nearest pixel that is none of these; outside, the weight is 1: such
-/// a place counts only where no other photograph knows better.
+/// A photograph ready for blending: sRGB with a weight of 1 … 255 in the fourth byte. The eroded rim, pixels softer
+/// than edge_alpha and all outside take the colour of the nearest pixel that is none of these; outside, the weight is
+/// 1: such a place counts only where no other photograph knows better.
 class PreparedPhoto {
  public:
   /// Throws Error{bad_input} naming the photograph where picture, mask and camera differ in size or type.

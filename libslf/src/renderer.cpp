@@ -1,34 +1,13 @@
-#include <lumihull/base/parallel.h>
 #include <lumihull/slf/renderer.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "color.h"
-#include "frame.h"
+#include "render_with.h"
 
 namespace lumihull::slf {
 namespace {
-
-/// Colours every sample by `color_of(sample)`.
-template <class ColorOf>
-Rendering render_with(const View& view, const RenderOptions& options, const hull::RayScene& scene,
-                      const hull::Mesh& mesh, Job& job, const ColorOf& color_of) {
-  Frame frame(view, options);
-  job.begin("rendering", frame.tiles());
-  parallel_for(
-      job, frame.tiles(),
-      [&](std::size_t i) {
-        const Tile tile = frame.tile(i);
-        const std::vector<SurfaceSample> samples = frame.trace(tile, scene, mesh);
-        std::vector<BlendColor> colors(samples.size());
-        for (std::size_t s = 0; s < samples.size(); ++s) colors[s] = color_of(samples[s]);
-        frame.resolve(tile, samples, colors);
-      },
-      true);
-  job.end();
-  return frame.finish();
-}
 
 /// Bilinear; (u, v) in texels, the first one's centre at (0.5, 0.5).
 BlendColor sample_texture(const Image& texture, float u, float v) {

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <lumihull/base/job.h>
+#include <lumihull/hull/mesh.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "atlas.h"
+#include "surface_samples.h"
+#include "view_nodes.h"
+
+namespace lumihull::slf {
+
+inline constexpr int kMaxStartTerms = 12;
+
+struct JointFitOptions {
+  int terms = 6;
+  int iterations = 8;
+  double surface_ridge = 0.05;
+  double view_smoothness = 0.02;
+};
+
+/// Factors as numbers. Texels and terms: `mean` (texels x 3), `surface` (texels x terms x 3); `seen`: sum of a texel's
+/// weights. View maps: `view` (vertices x nodes x terms), of unit mean square.
+struct JointFactors {
+  std::vector<float> mean, surface, seen;
+  std::vector<float> view;
+};
+
+/// min Σ w |c - T - Σ_k g_k Σ_j Λ_j h_k[v_j](e)|² over all samples by turns: surface maps and mean colour of each texel
+/// exactly; then the view maps of all vertices together for each photograph; then the values at the nodes that agree
+/// best with these. See README, "Joint factorisation".
+class JointFit {
+ public:
+  /// What is given must outlive the object.
+  JointFit(const hull::Mesh& mesh, const Atlas& atlas, std::span<const PhotoSamples> photos,
+           std::span<const Eigen::Vector3f> nodes, const JointFitOptions& options);
+
+  JointFactors run(Job& job);
+
+  /// Root mean squares of the samples' weighted residuals: with the factors, and with the mean colour alone.
+  double rms = 0, rms_of_mean = 0;
+
+ private:
+  void start();
+  void evaluate_nodes(Job& job);
+  void fit_surface(Job& job, bool with_rms);
+  void fit_views(Job& job);
+  void fit_nodes(Job& job);
+  void normalise();
+  void fit_view(std::size_t photo);
+
+  float* view_at(std::size_t photo, std::size_t vertex) { return &views_[photo][vertex * terms_]; }
+
+  const hull::Mesh& mesh_;
+  const Atlas& atlas_;
+  std::span<const PhotoSamples> photos_;
+  std::span<const Eigen::Vector3f> nodes_;
+  JointFitOptions options_;
+  std::size_t terms_, vertices_, blocks_;
+  Eigen::Vector3f middle_;
+  Eigen::MatrixXf laplacian_;
+  std::vector<std::array<std::uint32_t, 3>> edges_of_;  // of each triangle, see ViewSystem::Edges
+  std::vector<std::array<std::uint32_t, 2>> edges_;     // lower vertex first
+  std::vector<std::vector<NodeWeights>> weights_;       // photographs x vertices
+  std::vector<std::vector<float>> views_;               // photographs x vertices x terms: view maps at the photographs
+  std::vector<std::vector<float>> trust_;               // photographs x vertices: the weight behind them
+  JointFactors factors_;
+};
+
+}  // namespace lumihull::slf

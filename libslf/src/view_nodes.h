@@ -1,0 +1,34 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace lumihull::slf {
+
+inline constexpr int kNodesBlended = 3;
+
+/// How much the values at nodes count for an eye: Σ weight = 1. Unused entries have weight 0.
+struct NodeWeights {
+  std::array<std::uint8_t, kNodesBlended> node{};
+  std::array<float, kNodesBlended> weight{};
+};
+
+/// The nodes next to the eye as seen from a point, by their angles θ (Buehler et al. 2001, 4.1: w = (1/θ)(1 - θ/θ_max),
+/// θ_max the angle of the nearest node that is left out), so that weights vanish where nodes change, and an eye at a
+/// node has that node's values.
+NodeWeights node_weights(std::span<const Eigen::Vector3f> nodes, const Eigen::Vector3f& point,
+                         const Eigen::Vector3f& eye);
+
+/// At most `most` of the given places, spread evenly over the directions from `center`: the first, then always the one
+/// farthest from those taken. Places that differ by less than a tenth of a degree count as one. In ascending order.
+std::vector<std::uint32_t> choose_nodes(std::span<const Eigen::Vector3f> places, const Eigen::Vector3f& center,
+                                        std::size_t most);
+
+/// Graph Laplacian over nodes (symmetric, positive semidefinite, rows sum to 0): each node and its four nearest in
+/// direction from `center`, weighted by 1/angle², scaled so that the diagonal's mean is 1.
+Eigen::MatrixXf node_laplacian(std::span<const Eigen::Vector3f> nodes, const Eigen::Vector3f& center);
+
+}  // namespace lumihull::slf
