@@ -14,7 +14,7 @@ void require_matrix(const Matrix& a) {
 }
 
 void require_terms(int terms) {
-  if (terms < 1 || terms > kMaxTerms) fail("terms: expected 1 to " + std::to_string(kMaxTerms));
+  if (terms < 1 || terms > kMaxFactors) fail("terms: expected 1 to " + std::to_string(kMaxFactors));
 }
 
 void require_weights(const Matrix& weights, const Matrix& a) {

@@ -1,16 +1,16 @@
+#include "glb_read.h"
+
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
-#include <lumihull/internal/json.h>
 #include <lumihull/slf/glb.h>
 
-#include <cstdint>
+#include <array>
 #include <cstring>
-#include <string_view>
+#include <span>
 
 namespace lumihull::slf {
 namespace {
 
-using internal::Json;
 using internal::JsonReader;
 
 constexpr std::int64_t kMost = std::int64_t(1) << 32;  // bytes and counts in a file of at most 4 GB
@@ -57,16 +57,6 @@ std::int64_t optional_integer(const JsonReader& object, std::string_view key, st
   return object.has(key) ? object.at(key).integer(0, high) : fallback;
 }
 
-/// The bytes of a buffer view, within the binary chunk.
-std::string_view view_bytes(const JsonReader& top, std::size_t index, std::string_view binary) {
-  const JsonReader view = top.at("bufferViews").at(index);
-  if (view.at("buffer").integer(0, 1 << 20) != 0) view.at("buffer").fail("0, the file's own buffer");
-  const auto offset = std::size_t(optional_integer(view, "byteOffset", 0, kMost));
-  const auto length = std::size_t(view.at("byteLength").integer(1, kMost));
-  if (offset > binary.size() || length > binary.size() - offset) view.fail("a view within the binary chunk");
-  return binary.substr(offset, length);
-}
-
 struct Accessor {
   std::string_view bytes;  // from the first element on
   std::size_t count, stride;
@@ -74,8 +64,8 @@ struct Accessor {
 };
 
 /// Checks that all elements lie within their view.
-Accessor accessor_of(const JsonReader& top, std::size_t index, std::string_view binary, std::string_view type,
-                     std::size_t components) {
+Accessor accessor_of(const GlbFile& file, std::size_t index, std::string_view type, std::size_t components) {
+  const JsonReader top = file.top();
   const JsonReader a = top.at("accessors").at(index);
   if (a.has("sparse")) throw Error(ErrorCode::unsupported, "sparse accessors are not read", a.file());
   if (a.at("type").string() != type) a.at("type").fail("\"" + std::string(type) + "\"");
@@ -87,7 +77,7 @@ Accessor accessor_of(const JsonReader& top, std::size_t index, std::string_view 
                            components;
   out.count = std::size_t(a.at("count").integer(1, kMost));
   const auto view_index = std::size_t(a.at("bufferView").integer(0, kMost));
-  out.bytes = view_bytes(top, view_index, binary);
+  out.bytes = file.view(view_index);
   const auto offset = std::size_t(optional_integer(a, "byteOffset", 0, kMost));
   out.stride =
       std::size_t(optional_integer(top.at("bufferViews").at(view_index), "byteStride", std::int64_t(size), 252));
@@ -99,66 +89,93 @@ Accessor accessor_of(const JsonReader& top, std::size_t index, std::string_view 
 }
 
 template <class V>
-std::vector<V> read_vectors(const JsonReader& top, std::size_t index, std::string_view binary, const char* type) {
-  const Accessor a = accessor_of(top, index, binary, type, V::RowsAtCompileTime);
-  if (a.component != 5126) throw Error(ErrorCode::unsupported, "expected float vertex attributes", top.file());
+std::vector<V> read_vectors(const GlbFile& file, std::size_t index, const char* type) {
+  const Accessor a = accessor_of(file, index, type, V::RowsAtCompileTime);
+  if (a.component != 5126) throw Error(ErrorCode::unsupported, "expected float vertex attributes", file.name());
   std::vector<V> out(a.count);
   for (std::size_t i = 0; i < a.count; ++i) std::memcpy(out[i].data(), a.bytes.data() + i * a.stride, sizeof(V));
   return out;
 }
 
-std::vector<std::uint32_t> read_indices(const JsonReader& top, std::size_t index, std::string_view binary) {
-  const Accessor a = accessor_of(top, index, binary, "SCALAR", 1);
+}  // namespace
+
+std::size_t glb_index(const JsonReader& value) { return std::size_t(value.integer(0, kMost)); }
+
+GlbFile::GlbFile(const std::filesystem::path& path)
+    : bytes_(read_file(path, std::size_t(kMost))), name_(path.string()) {
+  const Chunks chunks = chunks_of(bytes_, name_);
+  binary_ = chunks.binary;
+  document_ = internal::parse_json(chunks.json, name_);
+}
+
+JsonReader GlbFile::primitive() const {
+  const JsonReader out = top().at("meshes").at(std::size_t(0)).at("primitives").at(std::size_t(0));
+  if (optional_integer(out, "mode", 4, 6) != 4) throw Error(ErrorCode::unsupported, "expected triangles", name_);
+  return out;
+}
+
+std::string_view GlbFile::view(std::size_t index) const {
+  const JsonReader view = top().at("bufferViews").at(index);
+  if (view.at("buffer").integer(0, 1 << 20) != 0) view.at("buffer").fail("0, the file's own buffer");
+  const auto offset = std::size_t(optional_integer(view, "byteOffset", 0, kMost));
+  const auto length = std::size_t(view.at("byteLength").integer(1, kMost));
+  if (offset > binary_.size() || length > binary_.size() - offset) view.fail("a view within the binary chunk");
+  return binary_.substr(offset, length);
+}
+
+std::vector<Eigen::Vector3f> GlbFile::vectors3(std::size_t accessor) const {
+  return read_vectors<Eigen::Vector3f>(*this, accessor, "VEC3");
+}
+
+std::vector<Eigen::Vector2f> GlbFile::vectors2(std::size_t accessor) const {
+  return read_vectors<Eigen::Vector2f>(*this, accessor, "VEC2");
+}
+
+std::vector<std::uint32_t> GlbFile::integers(std::size_t index) const {
+  const Accessor a = accessor_of(*this, index, "SCALAR", 1);
   if (a.component != 5121 && a.component != 5123 && a.component != 5125)
-    throw Error(ErrorCode::unsupported, "expected unsigned indices", top.file());
+    throw Error(ErrorCode::unsupported, "expected unsigned indices", name_);
   std::vector<std::uint32_t> out(a.count, 0);
   const std::size_t size = a.component == 5121 ? 1 : a.component == 5123 ? 2 : 4;
   for (std::size_t i = 0; i < a.count; ++i) std::memcpy(&out[i], a.bytes.data() + i * a.stride, size);
   return out;
 }
 
-}  // namespace
+Image GlbFile::texture(std::size_t index) const {
+  const JsonReader image = top().at("images").at(glb_index(top().at("textures").at(index).at("source")));
+  const std::string_view picture = view(glb_index(image.at("bufferView")));
+  Image out = decode_image(std::as_bytes(std::span(picture.data(), picture.size())),
+                           name_ + " (texture " + std::to_string(index) + ")", {false, 3});
+  return out.type() == PixelType::u8 ? std::move(out) : converted(out, PixelType::u8, 3);
+}
 
-TexturedMesh read_glb(const std::filesystem::path& path) {
-  const std::string bytes = read_file(path, std::size_t(kMost)), file = path.string();
-  const Chunks chunks = chunks_of(bytes, file);
-  const Json document = internal::parse_json(chunks.json, file);
-  const JsonReader top(document, file);
-
-  const JsonReader primitive = top.at("meshes").at(std::size_t(0)).at("primitives").at(std::size_t(0));
-  if (optional_integer(primitive, "mode", 4, 6) != 4) throw Error(ErrorCode::unsupported, "expected triangles", file);
-  const auto index_of = [](const JsonReader& r) { return std::size_t(r.integer(0, kMost)); };
-  const JsonReader attributes = primitive.at("attributes");
+TexturedMesh GlbFile::textured_mesh() const {
+  const JsonReader triangles = primitive();
+  const JsonReader attributes = triangles.at("attributes");
 
   TexturedMesh textured;
-  textured.mesh.vertices =
-      read_vectors<Eigen::Vector3f>(top, index_of(attributes.at("POSITION")), chunks.binary, "VEC3");
-  const auto uv = read_vectors<Eigen::Vector2f>(top, index_of(attributes.at("TEXCOORD_0")), chunks.binary, "VEC2");
-  if (uv.size() != textured.mesh.vertices.size()) bad(file, "expected one texture coordinate a vertex");
-  const auto indices = read_indices(top, index_of(primitive.at("indices")), chunks.binary);
+  textured.mesh.vertices = vectors3(glb_index(attributes.at("POSITION")));
+  const auto uv = vectors2(glb_index(attributes.at("TEXCOORD_0")));
+  if (uv.size() != textured.mesh.vertices.size()) bad(name_, "expected one texture coordinate a vertex");
+  const auto indices = integers(glb_index(triangles.at("indices")));
   if (indices.size() % 3)
-    bad(file, "expected three indices a triangle, not " + std::to_string(indices.size()) + " in all");
+    bad(name_, "expected three indices a triangle, not " + std::to_string(indices.size()) + " in all");
   for (std::size_t i = 0; i < indices.size(); i += 3) {
     std::array<Eigen::Vector2f, 3> corners;
     for (std::size_t k = 0; k < 3; ++k) {
       if (indices[i + k] >= uv.size())
-        bad(file, "index " + std::to_string(indices[i + k]) + " of " + std::to_string(uv.size()) + " vertices");
+        bad(name_, "index " + std::to_string(indices[i + k]) + " of " + std::to_string(uv.size()) + " vertices");
       corners[k] = uv[indices[i + k]];
     }
     textured.mesh.triangles.push_back({indices[i], indices[i + 1], indices[i + 2]});
     textured.uv.push_back(corners);
   }
-
-  const JsonReader material = top.at("materials").at(index_of(primitive.at("material")));
-  const JsonReader texture =
-      top.at("textures").at(index_of(material.at("pbrMetallicRoughness").at("baseColorTexture").at("index")));
-  const JsonReader image = top.at("images").at(index_of(texture.at("source")));
-  const std::string_view picture = view_bytes(top, index_of(image.at("bufferView")), chunks.binary);
-  textured.texture =
-      decode_image(std::as_bytes(std::span(picture.data(), picture.size())), file + " (texture)", {false, 3});
-  if (textured.texture.type() != PixelType::u8) textured.texture = converted(textured.texture, PixelType::u8, 3);
-  validate(textured, file);
+  const JsonReader material = top().at("materials").at(glb_index(triangles.at("material")));
+  textured.texture = texture(glb_index(material.at("pbrMetallicRoughness").at("baseColorTexture").at("index")));
+  validate(textured, name_);
   return textured;
 }
+
+TexturedMesh read_glb(const std::filesystem::path& path) { return GlbFile(path).textured_mesh(); }
 
 }  // namespace lumihull::slf

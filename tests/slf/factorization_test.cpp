@@ -497,7 +497,7 @@ TEST(Factorization, SaysWhatIsWrong) {
     EXPECT_EQ(e.code(), ErrorCode::invalid_argument);
     EXPECT_THAT(e.message(), testing::HasSubstr(words));
   };
-  for (const int terms : {0, -1, slf::kMaxTerms + 1, std::numeric_limits<int>::max()}) {
+  for (const int terms : {0, -1, slf::kMaxFactors + 1, std::numeric_limits<int>::max()}) {
     wrong([&] { slf::pca(a, terms, 1); }, "terms");
     wrong([&] { slf::nmf(a, terms, {}, 1); }, "terms");
     wrong([&] { slf::low_rank(a, w, terms, {}, 1); }, "terms");

@@ -11,13 +11,13 @@ namespace lumihull::slf {
 /// A matrix as a product of few terms: A ≈ surface * view. A row of A is a surface point (in one colour channel), a
 /// column is a view: A is n x m. Made by the functions below, which are pure, run on the caller's thread, and give the
 /// same bytes for the same input and seed. All of them throw Error{invalid_argument} for an empty matrix, a sample that
-/// is not finite or beyond 1e30, matrices that do not fit each other, and terms outside 1 … kMaxTerms.
+/// is not finite or beyond 1e30, matrices that do not fit each other, and terms outside 1 … kMaxFactors.
 struct Factors {
   Eigen::MatrixXf surface;  ///< n x K; terms fall in energy, the scale is here
   Eigen::MatrixXf view;     ///< K x m; rows of unit length, or zero where the matrix needs no more terms
 };
 
-inline constexpr int kMaxTerms = 64;
+inline constexpr int kMaxFactors = 64;
 
 /// The K terms nearest to A (n x m) in the Frobenius norm: its truncated singular value decomposition, factored as in
 /// Chen, Bouguet, Chu & Grzeszczuk 2002, "Light Field Mapping" (power iteration on a Gram matrix, signed). Here it is

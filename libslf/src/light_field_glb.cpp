@@ -1,0 +1,200 @@
+#include <libdeflate.h>
+#include <lumihull/base/error.h>
+#include <lumihull/base/files.h>
+#include <lumihull/slf/light_field_glb.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "glb_read.h"
+#include "glb_write.h"
+
+namespace lumihull::slf {
+namespace {
+
+using internal::Json;
+using internal::JsonReader;
+
+constexpr const char* kExtension = "LUMIHULL_surface_light_field";
+constexpr int kVersion = 1;
+constexpr int kUnsignedShort = 5123, kUnsignedInt = 5125;
+constexpr std::uint64_t kMostViewBytes = std::uint64_t(1) << 31;
+
+/// zlib format (RFC 1950), which browsers can inflate themselves.
+std::string deflated(const std::vector<std::uint8_t>& bytes) {
+  const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
+      libdeflate_alloc_compressor(12), libdeflate_free_compressor);
+  if (!compressor) throw Error(ErrorCode::out_of_memory, "no memory to compress the view maps");
+  std::string out(libdeflate_zlib_compress_bound(compressor.get(), bytes.size()), '\0');
+  out.resize(libdeflate_zlib_compress(compressor.get(), bytes.data(), bytes.size(), out.data(), out.size()));
+  return out;
+}
+
+/// nullopt where the bytes are damaged or not exactly `size`.
+bool inflate(std::string_view from, std::vector<std::uint8_t>& to) {
+  const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> decompressor(
+      libdeflate_alloc_decompressor(), libdeflate_free_decompressor);
+  if (!decompressor) throw Error(ErrorCode::out_of_memory, "no memory to unpack the view maps");
+  return libdeflate_zlib_decompress(decompressor.get(), from.data(), from.size(), to.data(), to.size(), nullptr) ==
+         LIBDEFLATE_SUCCESS;
+}
+
+/// Differences from the vertex before, for each node.
+void to_differences(std::vector<std::uint8_t>& rows, std::size_t length) {
+  for (std::size_t row = 0; row < rows.size(); row += length)
+    for (std::size_t i = length; i-- > 1;) rows[row + i] = std::uint8_t(rows[row + i] - rows[row + i - 1]);
+}
+void from_differences(std::vector<std::uint8_t>& rows, std::size_t length) {
+  for (std::size_t row = 0; row < rows.size(); row += length)
+    for (std::size_t i = 1; i < length; ++i) rows[row + i] = std::uint8_t(rows[row + i] + rows[row + i - 1]);
+}
+
+Json scale_json(const ByteScale& s) { return {{"scale", s.scale}, {"offset", s.offset}}; }
+
+ByteScale scale_of(const JsonReader& json) {
+  constexpr double kMost = 1e6;
+  return {float(json.at("scale").number(-kMost, kMost)), float(json.at("offset").number(-kMost, kMost))};
+}
+
+/// Vertices that triangles use, in their order: only such are in the file.
+std::vector<std::uint32_t> used_vertices(const hull::Mesh& mesh) {
+  std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
+  for (const auto& t : mesh.triangles)
+    for (const std::uint32_t v : t) used[v] = 1;
+  std::vector<std::uint32_t> out;
+  for (std::uint32_t v = 0; v < used.size(); ++v)
+    if (used[v]) out.push_back(v);
+  return out;
+}
+
+}  // namespace
+
+std::string encode_light_field(const LightField& field, const LightFieldFileOptions& options) {
+  validate(field, "light field");
+  if (options.texture_quality < 0 || options.texture_quality > 100 || options.map_quality < 0 ||
+      options.map_quality > 100)
+    throw Error(ErrorCode::invalid_argument, "texture_quality, map_quality: expected 0 (PNG) to 100");
+  GlbBuffer buffer;
+  const FileVertices file = split_vertices(field.base);
+  Json document = textured_document(field.base, file, {.jpeg_quality = options.texture_quality}, buffer);
+
+  const std::vector<std::uint32_t> used = used_vertices(field.base.mesh);
+  std::vector<std::uint32_t> renumbered(field.base.mesh.vertices.size(), 0), vertex_of;
+  for (std::uint32_t i = 0; i < used.size(); ++i) renumbered[used[i]] = i;
+  for (const std::uint32_t v : file.vertex) vertex_of.push_back(renumbered[v]);
+  const bool narrow = used.size() <= 65535;
+  const std::vector<std::uint16_t> narrow_of(narrow ? vertex_of.begin() : vertex_of.end(), vertex_of.end());
+  const std::size_t of_view = narrow ? buffer.add_view(narrow_of.data(), narrow_of.size() * 2)
+                                     : buffer.add_view(vertex_of.data(), vertex_of.size() * 4);
+  Json extension = {{"version", kVersion},
+                    {"vertices", used.size()},
+                    {"vertexOf", buffer.add_accessor({{"bufferView", of_view},
+                                                      {"componentType", narrow ? kUnsignedShort : kUnsignedInt},
+                                                      {"count", vertex_of.size()},
+                                                      {"type", "SCALAR"}})},
+                    {"addsBase", field.adds_base},
+                    {"nodes", buffer.add_vectors(field.nodes, false, 0)}};
+  if (!field.slot.empty()) {
+    std::vector<std::uint8_t> slots;
+    for (const std::uint32_t v : used) slots.push_back(field.slot[v]);
+    extension["slots"] = buffer.add_view(slots.data(), slots.size());
+  }
+  extension["terms"] = Json::array();
+  for (const LightFieldTerm& term : field.terms) {
+    Json surface = Json::array();
+    for (const Image& map : term.surface) {
+      const bool jpeg = options.map_quality > 0;
+      const std::string picture = jpeg ? encode_jpeg(map, options.map_quality) : encode_png(map);
+      document["images"].push_back({{"bufferView", buffer.add_view(picture.data(), picture.size())},
+                                    {"mimeType", jpeg ? "image/jpeg" : "image/png"}});
+      document["textures"].push_back({{"source", document["images"].size() - 1}, {"sampler", 0}});
+      surface.push_back(document["textures"].size() - 1);
+    }
+    std::vector<std::uint8_t> view;
+    view.reserve(used.size() * field.nodes.size());
+    for (std::size_t i = 0; i < field.nodes.size(); ++i)
+      for (const std::uint32_t v : used) view.push_back(term.view[i * field.base.mesh.vertices.size() + v]);
+    to_differences(view, used.size());
+    const std::string packed = deflated(view);
+    extension["terms"].push_back({{"surface", surface},
+                                  {"surfaceScale", scale_json(term.surface_scale)},
+                                  {"view", buffer.add_view(packed.data(), packed.size())},
+                                  {"viewScale", scale_json(term.view_scale)}});
+  }
+  document["extensionsUsed"].push_back(kExtension);
+  document["meshes"][0]["primitives"][0]["extensions"] = {{kExtension, std::move(extension)}};
+  return pack_glb(std::move(document), buffer);
+}
+
+std::uint64_t write_light_field(const std::filesystem::path& file, const LightField& field,
+                                const LightFieldFileOptions& options) {
+  const std::string bytes = encode_light_field(field, options);
+  write_file(file, bytes);
+  return bytes.size();
+}
+
+LightField read_light_field(const std::filesystem::path& path) {
+  const GlbFile file(path);
+  const JsonReader primitive = file.primitive();
+  if (!primitive.has("extensions") || !primitive.at("extensions").has(kExtension))
+    throw Error(ErrorCode::bad_input, std::string("the model has no light field: expected the extension ") + kExtension,
+                file.name());
+  const JsonReader extension = primitive.at("extensions").at(kExtension);
+  if (const auto version = extension.at("version").integer(1, 1'000'000); version != kVersion)
+    throw Error(ErrorCode::unsupported,
+                "light field of version " + std::to_string(version) + ", expected " + std::to_string(kVersion),
+                file.name());
+
+  LightField field;
+  TexturedMesh split = file.textured_mesh();
+  // Vertices that were doubled for the texture's sake become one again.
+  const JsonReader vertex_of_json = extension.at("vertexOf");
+  const std::vector<std::uint32_t> vertex_of = file.integers(glb_index(vertex_of_json));
+  const auto vertices = std::size_t(extension.at("vertices").integer(1, std::int64_t(split.mesh.vertices.size())));
+  if (vertex_of.size() != split.mesh.vertices.size()) vertex_of_json.fail("one number for each vertex of the file");
+  field.base.mesh.vertices.resize(vertices);
+  std::vector<std::uint8_t> known(vertices, 0);
+  for (std::size_t i = 0; i < vertex_of.size(); ++i) {
+    if (vertex_of[i] >= vertices) vertex_of_json.fail("numbers below " + std::to_string(vertices));
+    field.base.mesh.vertices[vertex_of[i]] = split.mesh.vertices[i];
+    known[vertex_of[i]] = 1;
+  }
+  if (std::find(known.begin(), known.end(), 0) != known.end())
+    vertex_of_json.fail("each of " + std::to_string(vertices) + " vertices");
+  field.base.mesh.triangles = std::move(split.mesh.triangles);
+  for (auto& t : field.base.mesh.triangles)
+    for (std::uint32_t& v : t) v = vertex_of[v];
+  field.base.uv = std::move(split.uv);
+  field.base.texture = std::move(split.texture);
+
+  field.adds_base = extension.at("addsBase").boolean();
+  field.nodes = file.vectors3(glb_index(extension.at("nodes")));
+  if (field.nodes.size() > std::size_t(kMaxNodes)) extension.at("nodes").fail("at most 255 nodes");
+  if (extension.has("slots")) {
+    const std::string_view slots = file.view(glb_index(extension.at("slots")));
+    if (slots.size() != vertices) extension.at("slots").fail("a byte for each vertex");
+    field.slot.assign(slots.begin(), slots.end());
+  }
+  const JsonReader terms = extension.at("terms");
+  const std::size_t count = terms.array_size(std::size_t(kMaxTerms));
+  if (std::uint64_t(vertices) * field.nodes.size() > kMostViewBytes)
+    extension.at("vertices").fail("view maps of at most 2 GB");
+  for (std::size_t k = 0; k < count; ++k) {
+    const JsonReader json = terms.at(k);
+    LightFieldTerm term;
+    const JsonReader surface = json.at("surface");
+    const std::size_t maps = surface.array_size(std::size_t(kMaxSlots));
+    for (std::size_t i = 0; i < maps; ++i) term.surface.push_back(file.texture(glb_index(surface.at(i))));
+    term.surface_scale = scale_of(json.at("surfaceScale"));
+    term.view_scale = scale_of(json.at("viewScale"));
+    term.view.resize(vertices * field.nodes.size());
+    if (!inflate(file.view(glb_index(json.at("view"))), term.view))
+      json.at("view").fail("zlib data of " + std::to_string(term.view.size()) + " bytes, undamaged");
+    from_differences(term.view, vertices);
+    field.terms.push_back(std::move(term));
+  }
+  validate(field, file.name());
+  return field;
+}
+
+}  // namespace lumihull::slf
