@@ -122,6 +122,7 @@ int Program::run(int argc, char** argv) {
   add_import(*this);
   add_key(*this);
   add_hull(*this);
+  add_lightfield(*this);
   add_render(*this);
   add_evaluate(*this);
   add_run(*this);
@@ -197,15 +198,15 @@ namespace {
 void say_result(Program& program, const slf::StageResult& result) {
   char line[160];
   if (result.skipped && result.record.finished.empty())
-    std::snprintf(line, sizeof line, "%-9s -", result.stage.c_str());
+    std::snprintf(line, sizeof line, "%-10s -", result.stage.c_str());
   else if (result.skipped)
-    std::snprintf(line, sizeof line, "%-9s nothing has changed since %s", result.stage.c_str(),
+    std::snprintf(line, sizeof line, "%-10s nothing has changed since %s", result.stage.c_str(),
                   result.record.finished.c_str());
   else
-    std::snprintf(line, sizeof line, "%-9s %s, at most %.0f MB", result.stage.c_str(),
+    std::snprintf(line, sizeof line, "%-10s %s, at most %.0f MB", result.stage.c_str(),
                   duration(result.record.seconds).c_str(), double(result.record.peak_bytes) / 1e6);
   program.say(line);
-  for (const std::string& said : result.said) program.say("          " + said);
+  for (const std::string& said : result.said) program.say("           " + said);
 }
 
 std::string results_json(const std::vector<slf::StageResult>& results) {

@@ -16,7 +16,7 @@ namespace lumihull::program {
 namespace {
 
 struct Arguments {
-  std::string folder, output, cameras, method = "lumigraph", background = "transparent";
+  std::string folder, output, cameras, method = "light_field", background = "transparent";
   slf::TurntableOptions turntable;
   int rays = 2;
   bool held_out = false, overwrite = false;
@@ -79,9 +79,11 @@ void add_render(Program& program) {
       program.verb("render", "new views: PNG pictures along a path", [&program, a] { render(program, *a); });
   verb->add_option("capture", a->folder, "folder of the capture")->required();
   verb->add_option("-o,--output", a->output, "folder for the pictures [CAPTURE/render]");
-  verb->add_option("--method", a->method,
-                   "lumigraph (blends photographs), mean_texture or shaded (bare hull) [lumigraph]")
-      ->check(CLI::IsMember({"lumigraph", "mean_texture", "shaded"}));
+  verb->add_option(
+          "--method", a->method,
+          "light_field (the factored model), lumigraph (blends photographs), mean_texture or shaded (bare hull) "
+          "[light_field]")
+      ->check(CLI::IsMember({"light_field", "lumigraph", "mean_texture", "shaded"}));
   auto* turntable = verb->add_option("--turntable", a->turntable.frames, "so many frames around the object [60]")
                         ->check(CLI::Range(1, 100000));
   auto* cameras = verb->add_option("--cameras", a->cameras, "cameras from a JSON file")->excludes(turntable);

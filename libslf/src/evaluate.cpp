@@ -2,6 +2,7 @@
 #include <lumihull/internal/json.h>
 #include <lumihull/slf/evaluate.h>
 #include <lumihull/slf/glb.h>
+#include <lumihull/slf/light_field_glb.h>
 #include <lumihull/slf/photos.h>
 
 #include <algorithm>
@@ -117,6 +118,7 @@ std::string Evaluation::to_json() const {
   if (!std::isnan(mean.keyed_iou)) out["keyed_iou"] = mean.keyed_iou;
   out["triangles"] = triangles;
   out["model_bytes"] = model_bytes;
+  if (light_field_bytes) out["light_field_bytes"] = light_field_bytes;
   out["methods"] = methods_json(mean.methods);
   out["stages"] = Json::object();
   for (const auto& [name, record] : stages)
@@ -139,6 +141,11 @@ Evaluation evaluate_capture(const Capture& capture, const EvaluateOptions& optio
   const fs::path model = options.model.empty() ? capture.folder() / "textured.glb" : options.model;
   const TexturedMesh textured = read_glb(model);
   const hull::RayScene scene(textured.mesh);
+  const fs::path light_field_file =
+      options.light_field.empty() ? capture.folder() / "light_field.glb" : options.light_field;
+  std::optional<LightFieldRenderer> light_field;
+  if (!options.light_field.empty() || file_exists(light_field_file))
+    light_field.emplace(read_light_field(light_field_file));
   Lumigraph lumigraph(textured.mesh, scene, photos_of(capture, used), options.lumigraph);
 
   Evaluation evaluation;
@@ -146,6 +153,7 @@ Evaluation evaluate_capture(const Capture& capture, const EvaluateOptions& optio
   evaluation.photos_held_out = held_out.size();
   evaluation.triangles = textured.mesh.triangles.size();
   evaluation.model_bytes = fs::file_size(model);
+  if (light_field) evaluation.light_field_bytes = fs::file_size(light_field_file);
   evaluation.stages = capture.stages;
   const auto background = capture.background_rgb.value_or(std::array<std::uint8_t, 3>{0, 0, 0});
   const fs::path folder = capture.folder() / "evaluate";
@@ -172,6 +180,7 @@ Evaluation evaluate_capture(const Capture& capture, const EvaluateOptions& optio
     const Rendering rendering = render_texture(textured, scene, references.views[i], options.render, job);
     result.silhouette_iou = silhouette_iou(coverage_of(rendering.rgba), photo.alpha);
     judge("mean_texture", rendering);
+    if (light_field) judge("light_field", light_field->render(references.views[i], options.render, job));
     judge("lumigraph", lumigraph.render(references.views[i], options.render, job));
     evaluation.views.push_back(std::move(result));
   }

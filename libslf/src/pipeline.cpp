@@ -17,13 +17,15 @@ namespace lumihull::slf {
 namespace {
 
 using Definition = const StageDefinition& (*)();
-constexpr std::array<std::string_view, 5> kNames{"key", "hull", "texture", "evaluate", "report"};
-constexpr std::array<Definition, 5> kDefinitions{key_stage, hull_stage, texture_stage, evaluate_stage, report_stage};
+constexpr std::array<std::string_view, 6> kNames{"key", "hull", "texture", "lightfield", "evaluate", "report"};
+constexpr std::array<Definition, 6> kDefinitions{key_stage,        hull_stage,     texture_stage,
+                                                 lightfield_stage, evaluate_stage, report_stage};
 
 const StageDefinition& definition(std::string_view stage) {
   for (const Definition d : kDefinitions)
     if (d().name == stage) return d();
-  throw Error(ErrorCode::invalid_argument, "expected one of key, hull, texture, evaluate, report", std::string(stage));
+  throw Error(ErrorCode::invalid_argument, "expected one of key, hull, texture, lightfield, evaluate, report",
+              std::string(stage));
 }
 
 const OptionSpec& specification(std::string_view stage, std::string_view name) {

@@ -45,6 +45,7 @@ struct StageDefinition {
 const StageDefinition& key_stage();
 const StageDefinition& hull_stage();
 const StageDefinition& texture_stage();
+const StageDefinition& lightfield_stage();
 const StageDefinition& evaluate_stage();
 const StageDefinition& report_stage();
 
@@ -59,6 +60,7 @@ void add_cameras(const Capture& capture, InputDigest& digest);  ///< intrinsics,
 void add_masks(const Capture& capture, InputDigest& digest);    ///< bytes of all masks
 
 std::filesystem::path textured_path(const Capture& capture);
+std::filesystem::path light_field_path(const Capture& capture);
 std::filesystem::path evaluation_path(const Capture& capture);
 
 /// A mask to judge a photograph by: NAME.png, .jpg, .jpeg, .tif or .tiff; nullopt where there is none.

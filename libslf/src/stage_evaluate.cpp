@@ -27,6 +27,7 @@ void inputs(const Capture& capture, InputDigest& digest) {
   add_cameras(capture, digest);
   add_masks(capture, digest);
   digest.add_file("model", textured_path(capture));
+  digest.add_file("light field", light_field_path(capture));
   if (capture.background_rgb)
     digest.add("background", {reinterpret_cast<const char*>(capture.background_rgb->data()), 3});
   const std::filesystem::path references = reference_folder(capture);

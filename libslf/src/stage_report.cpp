@@ -47,6 +47,8 @@ std::optional<Evaluation> read_evaluation(const Capture& capture) {
   evaluation.triangles = std::size_t(top.at("triangles").integer(0, INT64_MAX));
   evaluation.model_bytes = std::uint64_t(top.at("model_bytes").integer(0, INT64_MAX));
   evaluation.mean = read_view(top);
+  if (top.has("light_field_bytes"))
+    evaluation.light_field_bytes = std::uint64_t(top.at("light_field_bytes").integer(0, INT64_MAX));
   const JsonReader views = top.at("views");
   const std::size_t n = views.array_size(1'000'000);
   for (std::size_t i = 0; i < n; ++i) evaluation.views.push_back(read_view(views.at(i)));
@@ -62,6 +64,7 @@ void inputs(const Capture& capture, InputDigest& digest) {
   add_masks(capture, digest);
   digest.add_file("hull", capture.hull_path());
   digest.add_file("model", textured_path(capture));
+  digest.add_file("light field", light_field_path(capture));
   digest.add_file("evaluation", evaluation_path(capture));
 }
 

@@ -18,6 +18,7 @@ namespace lumihull::slf {
 struct EvaluateOptions {
   std::filesystem::path reference_masks;  ///< folder of masks named like the shots; empty: the capture's own masks
   std::filesystem::path model;            ///< textured mesh; empty: textured.glb in the capture
+  std::filesystem::path light_field;      ///< empty: light_field.glb in the capture, where there is one
   RenderOptions render{3, false};
   LumigraphOptions lumigraph;
   bool pictures = true;  ///< write reference | rendering | difference to evaluate/ in the capture
@@ -30,20 +31,21 @@ struct ViewEvaluation {
       std::numeric_limits<double>::quiet_NaN();                 ///< rendered hull, coverage >= 0.5, and reference mask
   double keyed_iou = std::numeric_limits<double>::quiet_NaN();  ///< the capture's mask and the reference mask, where a
                                                                 ///< folder was given
-  std::map<std::string, PictureQuality> methods;                ///< "lumigraph", "mean_texture"
+  std::map<std::string, PictureQuality> methods;                ///< "light_field", "lumigraph", "mean_texture"
 };
 
 struct Evaluation {
   std::size_t photos_used = 0, photos_held_out = 0;
   std::size_t triangles = 0;
-  std::uint64_t model_bytes = 0;  ///< of textured.glb
+  std::uint64_t model_bytes = 0;        ///< of textured.glb
+  std::uint64_t light_field_bytes = 0;  ///< of light_field.glb; 0: there is none
   ViewEvaluation mean;
   std::vector<ViewEvaluation> views;
   std::map<std::string, StageRecord, std::less<>> stages;
 
   /// One JSON object: "photos_used", "photos_held_out", "silhouette_iou", "keyed_iou" (where reference masks were
-  /// given), "triangles", "model_bytes", "methods", "stages", and "views" with the values per photograph. NaN becomes
-  /// null.
+  /// given), "triangles", "model_bytes", "light_field_bytes" (where there is one), "methods", "stages", and "views"
+  /// with the values per photograph. NaN becomes null.
   LUMIHULL_API std::string to_json() const;
 };
 
@@ -52,9 +54,9 @@ struct Evaluation {
 /// Reference: the photograph composited with its soft mask over the capture's background_rgb (black where it has none);
 /// the rendering is composited over the same with its own coverage. The mask is the one of the given folder, else the
 /// capture's, else wholly opaque. 'Inside' is where the reference mask is >= 128. The texture's quality is that of the
-/// model's file, JPEG losses included; the lumigraph blends the photographs that are not held out, on the same mesh.
-/// Writes evaluate/NAME.METHOD.png with `pictures`. Errors: degenerate (nothing held out), not_found (the model, a
-/// mask), bad_input.
+/// model's file, JPEG losses included, and so is the light field's, on its own mesh; the lumigraph blends the
+/// photographs that are not held out, on the same mesh. Writes evaluate/NAME.METHOD.png with `pictures`. Errors:
+/// degenerate (nothing held out), not_found (the model, a mask), bad_input.
 LUMIHULL_API Evaluation evaluate_capture(const Capture& capture, const EvaluateOptions& options, Job& job);
 
 }  // namespace lumihull::slf

@@ -10,8 +10,8 @@
 namespace lumihull::slf {
 
 struct LightFieldFileOptions {
-  int texture_quality = 92;  ///< of the mean colour's JPEG, 1 … 100; 0: PNG, without loss
-  int map_quality = 85;      ///< of the surface maps' JPEGs, likewise
+  int texture_quality = 85;  ///< of the mean colour's JPEG, 1 … 100; 0: PNG, without loss
+  int map_quality = 75;      ///< of the surface maps' JPEGs, likewise
 };
 
 /// A light field as glTF 2.0 binary. Any viewer shows the mesh with its texture (see encode_glb); whoever knows the

@@ -17,11 +17,12 @@ namespace lumihull::slf {
 /// The stages in the order in which `run` does them. The verbs, the C API and Python share this list: they only parse
 /// and print.
 ///
-///     key       photographs -> masks/                (left out where every mask was imported or drawn)
-///     hull      masks, cameras -> hull.ply
-///     texture   hull.ply, photographs -> textured.glb
-///     evaluate  held-out photographs -> evaluate/    (left out where none is held out)
-///     report    everything -> report.html
+///     key         photographs -> masks/                (left out where every mask was imported or drawn)
+///     hull        masks, cameras -> hull.ply
+///     texture     hull.ply, photographs -> textured.glb
+///     lightfield  hull.ply, photographs -> light_field.glb
+///     evaluate    held-out photographs -> evaluate/    (left out where none is held out)
+///     report      everything -> report.html
 LUMIHULL_API std::span<const std::string_view> stage_names();
 
 /// One option of a stage: where its name, type, range, default and help are written down, once for all doors.

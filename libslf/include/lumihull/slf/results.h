@@ -7,6 +7,7 @@
 #include <lumihull/base/files.h>
 #include <lumihull/hull/mesh.h>
 #include <lumihull/slf/glb.h>
+#include <lumihull/slf/light_field_glb.h>
 
 #include <filesystem>
 #include <string>
@@ -27,6 +28,10 @@ inline hull::Mesh read_hull(const Capture& capture) { return hull::read_mesh(res
 /// textured.glb
 inline TexturedMesh read_textured(const Capture& capture) {
   return read_glb(result_of(capture.folder() / "textured.glb", "texture"));
+}
+/// light_field.glb
+inline LightField read_light_field(const Capture& capture) {
+  return read_light_field(result_of(capture.folder() / "light_field.glb", "lightfield"));
 }
 /// evaluation.json: one JSON object
 inline std::string read_evaluation(const Capture& capture) {
