@@ -31,6 +31,9 @@ class EmbreeScene {
 
   RTCScene get() const { return scene_; }
 
+  /// Whether packets of 16 rays are traced as such here (AVX-512).
+  bool takes_16_rays() const { return rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0; }
+
  private:
   void build(const Mesh& mesh) {
     scene_ = rtcNewScene(device_);

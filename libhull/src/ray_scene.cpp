@@ -8,8 +8,9 @@
 namespace lumihull::hull {
 
 struct RayScene::Impl {
-  explicit Impl(const Mesh& mesh) : scene(mesh) {}
+  explicit Impl(const Mesh& mesh) : scene(mesh), wide(scene.takes_16_rays()) {}
   EmbreeScene scene;
+  bool wide;
 };
 
 namespace {
@@ -57,6 +58,50 @@ void load(const Ray& ray, RTCRay& r) {
   r.mask = ~0u;
 }
 
+void intersect(const int* valid, RTCScene scene, RTCIntersectContext* context, RTCRayHit8* packet) {
+  rtcIntersect8(valid, scene, context, packet);
+}
+
+void intersect(const int* valid, RTCScene scene, RTCIntersectContext* context, RTCRayHit16* packet) {
+  rtcIntersect16(valid, scene, context, packet);
+}
+
+/// Rays from one point, as many at a time as a packet has lanes.
+template <class Packet, std::size_t kLanes>
+void hit_from(RTCScene scene, const Eigen::Vector3f& origin, const Directions& d, std::span<Hit> out) {
+  RTCIntersectContext c = context(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  alignas(64) Packet packet;
+  alignas(64) int valid[kLanes];
+  std::fill_n(packet.ray.org_x, kLanes, origin.x());
+  std::fill_n(packet.ray.org_y, kLanes, origin.y());
+  std::fill_n(packet.ray.org_z, kLanes, origin.z());
+  std::fill_n(packet.ray.tnear, kLanes, 0.0f);
+  std::fill_n(packet.ray.time, kLanes, 0.0f);
+  std::fill_n(packet.ray.mask, kLanes, ~0u);
+  std::fill_n(packet.ray.flags, kLanes, 0u);
+  for (unsigned i = 0; i < kLanes; ++i) packet.ray.id[i] = i;
+  for (std::size_t first = 0; first < out.size(); first += kLanes) {
+    const std::size_t n = std::min(kLanes, out.size() - first);
+    std::copy_n(d.x.data() + first, n, packet.ray.dir_x);
+    std::copy_n(d.y.data() + first, n, packet.ray.dir_y);
+    std::copy_n(d.z.data() + first, n, packet.ray.dir_z);
+    for (std::size_t i = n; i < kLanes; ++i) packet.ray.dir_x[i] = packet.ray.dir_y[i] = packet.ray.dir_z[i] = 1;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      // What is not finite times 0 is not 0.
+      const float sum = 0 * packet.ray.dir_x[i] + 0 * packet.ray.dir_y[i] + 0 * packet.ray.dir_z[i];
+      valid[i] = sum == 0 && i < n ? -1 : 0;
+    }
+    std::fill_n(packet.ray.tfar, kLanes, std::numeric_limits<float>::infinity());
+    std::fill_n(packet.hit.geomID, kLanes, RTC_INVALID_GEOMETRY_ID);
+    std::fill_n(packet.hit.instID[0], kLanes, RTC_INVALID_GEOMETRY_ID);
+    intersect(valid, scene, &c, &packet);
+    for (std::size_t i = 0; i < n; ++i)
+      out[first + i] = packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID
+                           ? Hit{}
+                           : Hit{packet.hit.primID[i], packet.ray.tfar[i], packet.hit.u[i], packet.hit.v[i]};
+  }
+}
+
 }  // namespace
 
 RayScene::RayScene(const Mesh& mesh) : impl_(std::make_unique<Impl>(mesh)) {}
@@ -98,6 +143,14 @@ void RayScene::hit(std::span<const Ray> rays, std::span<Hit> out) const {
                            ? Hit{}
                            : Hit{packet.hit.primID[i], packet.ray.tfar[i], packet.hit.u[i], packet.hit.v[i]};
   }
+}
+
+void RayScene::hit(const Eigen::Vector3f& origin, const Directions& directions, std::span<Hit> out) const {
+  assert(directions.x.size() == out.size() && directions.y.size() == out.size() && directions.z.size() == out.size());
+  if (impl_->wide)
+    hit_from<RTCRayHit16, 16>(impl_->scene.get(), origin, directions, out);
+  else
+    hit_from<RTCRayHit8, 8>(impl_->scene.get(), origin, directions, out);
 }
 
 void RayScene::occluded(std::span<const Ray> rays, std::span<std::uint8_t> out) const {

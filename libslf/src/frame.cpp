@@ -13,6 +13,34 @@ namespace lumihull::slf {
 namespace {
 
 constexpr int kTileSide = 32;
+// In barycentric coordinates: how far outside of a triangle its plane still stands for the surface.
+constexpr float kBeside = 0.1f;
+
+void check(const View& view, const RenderOptions& options) {
+  if (options.rays < 1 || options.rays > 8)
+    throw Error(ErrorCode::invalid_argument,
+                "expected 1 to 8 rays along a pixel's side, not " + std::to_string(options.rays));
+  try {
+    view.camera.validate();
+  } catch (const Error& e) {
+    throw Error(ErrorCode::invalid_argument, e.message(), "camera of the new view");
+  }
+  if (!view.cam_from_world.rotation.coeffs().allFinite() || !view.cam_from_world.translation.allFinite())
+    throw Error(ErrorCode::invalid_argument, "the pose is not finite", "camera of the new view");
+}
+
+/// Where the mesh is, as (x / z, y / z) in the camera's frame; anywhere if it is not all before the camera.
+Eigen::AlignedBox2d bounds_seen(const View& view, const hull::Mesh& mesh) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Eigen::AlignedBox2d box;
+  const Eigen::Matrix3d rotation = view.cam_from_world.rotation.toRotationMatrix();
+  for (const auto& v : mesh.vertices) {
+    const Eigen::Vector3d p = rotation * v.cast<double>() + view.cam_from_world.translation;
+    if (!(p.z() > 0)) return {Eigen::Vector2d(-kInfinity, -kInfinity), Eigen::Vector2d(kInfinity, kInfinity)};
+    box.extend(Eigen::Vector2d(p.head<2>() / p.z()));
+  }
+  return box;
+}
 
 struct Level {
   int width, height;
@@ -35,21 +63,19 @@ Level halved(const Level& fine) {
 
 }  // namespace
 
-Frame::Frame(const View& view, const RenderOptions& options) : view_(view), options_(options) {
-  if (options.rays < 1 || options.rays > 8)
-    throw Error(ErrorCode::invalid_argument,
-                "expected 1 to 8 rays along a pixel's side, not " + std::to_string(options.rays));
-  try {
-    view.camera.validate();
-  } catch (const Error& e) {
-    throw Error(ErrorCode::invalid_argument, e.message(), "camera of the new view");
-  }
-  if (!view.cam_from_world.rotation.coeffs().allFinite() || !view.cam_from_world.translation.allFinite())
-    throw Error(ErrorCode::invalid_argument, "the pose is not finite", "camera of the new view");
-  columns_ = (view.camera.width + kTileSide - 1) / kTileSide;
-  rows_ = (view.camera.height + kTileSide - 1) / kTileSide;
-  center_ = view.center();
-  world_from_cam_ = view.cam_from_world.rotation.conjugate().toRotationMatrix();
+Frame::Frame(const View& view, const RenderOptions& options, const hull::Mesh& mesh, const hull::RayScene& scene,
+             const std::vector<MeshEdge>* edges)
+    : view_((check(view, options), view)),
+      options_(options),
+      mesh_(mesh),
+      scene_(scene),
+      rays_(view),
+      columns_((view.camera.width + kTileSide - 1) / kTileSide),
+      rows_((view.camera.height + kTileSide - 1) / kTileSide),
+      center_(view.center()),
+      seen_(bounds_seen(view, mesh)),
+      adaptive_(options.adaptive && options.rays > 1 && rays_.everywhere()) {
+  if (adaptive_) adaptive_ = mark_outlines(view, mesh, edges ? *edges : mesh_edges(mesh), marked_);
   out_.rgba = Image(view.camera.width, view.camera.height, 4);
   if (options.depth) {
     out_.depth = Image(view.camera.width, view.camera.height, 1, PixelType::f32);
@@ -64,30 +90,105 @@ Tile Frame::tile(std::size_t i) const {
   return {x0, y0, std::min(kTileSide, view_.camera.width - x0), std::min(kTileSide, view_.camera.height - y0)};
 }
 
-std::vector<SurfaceSample> Frame::trace(const Tile& tile, const hull::RayScene& scene, const hull::Mesh& mesh) const {
-  const int n = options_.rays;
-  const std::size_t count = std::size_t(tile.width) * tile.height * n * n;
-  std::vector<hull::Ray> rays;
-  std::vector<std::uint32_t> pixels;
-  rays.reserve(count), pixels.reserve(count);
-  const Eigen::Vector3f origin = center_.cast<float>();
-  for (int y = 0; y < tile.height; ++y)
-    for (int x = 0; x < tile.width; ++x)
-      for (int j = 0; j < n; ++j)
-        for (int i = 0; i < n; ++i) {
-          const auto ray = view_.camera.ray({tile.x0 + x + (i + 0.5) / n, tile.y0 + y + (j + 0.5) / n});
-          if (!ray) continue;
-          rays.push_back({origin, (world_from_cam_ * *ray).cast<float>()});
-          pixels.push_back(std::uint32_t(y * tile.width + x));
-        }
-  std::vector<hull::Hit> hits(rays.size());
-  scene.hit(rays, hits);
+SurfaceSample Frame::sample(std::uint32_t pixel, const hull::Hit& hit) const {
+  const auto& t = mesh_.triangles[hit.triangle];
+  const Eigen::Vector3f &a = mesh_.vertices[t[0]], &b = mesh_.vertices[t[1]], &c = mesh_.vertices[t[2]];
+  return {pixel, hit, a + hit.b1 * (b - a) + hit.b2 * (c - a)};
+}
+
+/// n x n rays for each of the pixels; hits in their order.
+std::vector<hull::Hit> Frame::cast(const Tile& tile, const std::vector<std::uint32_t>& pixels, int n) const {
+  const std::size_t count = pixels.size() * std::size_t(n * n);
+  std::vector<double> at(2 * count);
+  std::vector<float> directions(3 * count);
+  double *u = at.data(), *v = u + count;
+  std::size_t k = 0;
+  for (const std::uint32_t pixel : pixels) {
+    const int x = tile.x0 + int(pixel) % tile.width, y = tile.y0 + int(pixel) / tile.width;
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i, ++k) u[k] = x + (i + 0.5) / n, v[k] = y + (j + 0.5) / n;
+  }
+  float *x = directions.data(), *y = x + count, *z = y + count;
+  rays_.fill(count, u, v, x, y, z);
+  std::vector<hull::Hit> hits(count);
+  scene_.hit(center_.cast<float>(), {{x, count}, {y, count}, {z, count}}, hits);
+  return hits;
+}
+
+Frame::Plane Frame::plane(const hull::Hit& hit, const Eigen::Matrix<float, 3, 2>& slopes) const {
+  // Cramer's rule for eye + t d = a + b1 e1 + b2 e2 (Möller & Trumbore 1997): t = t' / (d normal), b = (d q) / (d
+  // normal) with all of them linear in d, and so in the pixel.
+  const auto& t = mesh_.triangles[hit.triangle];
+  const Eigen::Vector3f& a = mesh_.vertices[t[0]];
+  const Eigen::Vector3f e1 = mesh_.vertices[t[1]] - a, e2 = mesh_.vertices[t[2]] - a;
+  const Eigen::Vector3f s = center_.cast<float>() - a;
+  const Eigen::Vector3f normal = e2.cross(e1);
+  const Eigen::Matrix<float, 2, 3> by_pixel = slopes.transpose() * (-hit.t / normal.dot(s));
+  return {hit, by_pixel * normal, by_pixel * e2.cross(s), by_pixel * s.cross(e1)};
+}
+
+bool Frame::Plane::holds(int n) const {
+  const float end = 0.5f - 0.5f / float(n);
+  bool good = true;
+  for (const Eigen::Vector2f& off : {Eigen::Vector2f(-end, -end), {end, -end}, {-end, end}, {end, end}}) {
+    const hull::Hit h = at(off);
+    good = good && h.t > 0 && std::min({h.b1, h.b2, 1 - h.b1 - h.b2}) > -kBeside;
+  }
+  return good;
+}
+
+std::vector<SurfaceSample> Frame::trace(const Tile& tile) const {
   std::vector<SurfaceSample> samples;
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    if (!hits[i]) continue;
-    const auto& t = mesh.triangles[hits[i].triangle];
-    const Eigen::Vector3f &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
-    samples.push_back({pixels[i], hits[i], a + hits[i].b1 * (b - a) + hits[i].b2 * (c - a)});
+  if (!rays_.bounds(tile.x0, tile.y0, tile.width, tile.height).intersects(seen_)) return samples;
+  const int n = options_.rays;
+  const std::size_t per_pixel = std::size_t(n * n), count = std::size_t(tile.width) * std::size_t(tile.height);
+
+  // Pixels in the order of their rays: squares of so many that their rays fill a packet.
+  const int side = n == 1 || adaptive_ ? 4 : n == 2 ? 2 : 1;
+  std::vector<std::uint32_t> many, single;
+  for (int by = 0; by < tile.height; by += side)
+    for (int bx = 0; bx < tile.width; bx += side)
+      for (int y = by; y < std::min(by + side, tile.height); ++y)
+        for (int x = bx; x < std::min(bx + side, tile.width); ++x) {
+          const bool one =
+              adaptive_ &&
+              !marked_[std::size_t(tile.y0 + y) * std::size_t(view_.camera.width) + std::size_t(tile.x0 + x)];
+          (one ? single : many).push_back(std::uint32_t(y * tile.width + x));
+        }
+
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  std::vector<Plane> planes;
+  std::vector<std::uint32_t> plane_of(count, kNone), first_hit(count, kNone);
+  std::size_t most = 0;
+  if (!single.empty()) {
+    const std::vector<hull::Hit> centers = cast(tile, single, 1);
+    const auto slopes = rays_.slopes({tile.x0 + 0.5 * tile.width, tile.y0 + 0.5 * tile.height});
+    for (std::size_t i = 0; i < single.size(); ++i) {
+      if (!centers[i]) continue;
+      const Plane p = plane(centers[i], slopes);
+      if (p.holds(n)) {
+        plane_of[single[i]] = std::uint32_t(planes.size());
+        planes.push_back(p);
+      } else {
+        many.push_back(single[i]);
+      }
+    }
+    most = planes.size() * per_pixel;
+  }
+  const std::vector<hull::Hit> hits = cast(tile, many, n);
+  for (std::size_t i = 0; i < many.size(); ++i) first_hit[many[i]] = std::uint32_t(i * per_pixel);
+
+  samples.reserve(most + hits.size());
+  for (std::uint32_t pixel = 0; pixel < count; ++pixel) {
+    if (plane_of[pixel] != kNone) {
+      for (int j = 0; j < n; ++j)
+        for (int i = 0; i < n; ++i)
+          samples.push_back(sample(pixel, planes[plane_of[pixel]].at({(float(i) + 0.5f) / float(n) - 0.5f,
+                                                                      (float(j) + 0.5f) / float(n) - 0.5f})));
+    } else if (first_hit[pixel] != kNone) {
+      for (std::size_t k = first_hit[pixel]; k < first_hit[pixel] + per_pixel; ++k)
+        if (hits[k]) samples.push_back(sample(pixel, hits[k]));
+    }
   }
   return samples;
 }

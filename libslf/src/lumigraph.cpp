@@ -116,7 +116,7 @@ Lumigraph& Lumigraph::operator=(Lumigraph&&) noexcept = default;
 Lumigraph::~Lumigraph() = default;
 
 Rendering Lumigraph::render(const View& view, const RenderOptions& options, Job& job) {
-  Frame frame(view, options);
+  Frame frame(view, options, impl_->mesh, impl_->scene);
   const Eigen::Vector3f eye = frame.center().cast<float>();
   const float pixel_angle = float(1 / (view.camera.f * std::sqrt(view.camera.s)));
   job.begin("rendering", 2 * frame.tiles());
@@ -127,7 +127,7 @@ Rendering Lumigraph::render(const View& view, const RenderOptions& options, Job&
         [&](std::size_t i) {
           Work& work = works[i];
           work.tile = frame.tile(first + i);
-          work.samples = frame.trace(work.tile, impl_->scene, impl_->mesh);
+          work.samples = frame.trace(work.tile);
           if (!work.samples.empty()) impl_->choose_sources(work, eye, pixel_angle);
         },
         true);

@@ -13,6 +13,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -91,6 +92,8 @@ struct LightFieldReport {
 LUMIHULL_API LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos,
                                         const LightFieldOptions& options, Job& job, LightFieldReport* report = nullptr);
 
+struct MeshEdge;
+
 /// Renders a light field from any camera, its lens included. Immutable: any number of threads may render.
 class LUMIHULL_API LightFieldRenderer {
  public:
@@ -105,11 +108,12 @@ class LUMIHULL_API LightFieldRenderer {
   Rendering render(const View& view, const RenderOptions& options, Job& job) const;
 
  private:
-  /// View maps of all vertices for one eye: vertices x terms.
+  /// View maps of all vertices for one eye: vertices x terms, each value three times, vertices padded to 8 values.
   std::vector<float> view_values(const Eigen::Vector3f& eye, Job& job) const;
 
   hull::Mesh mesh_;
   hull::RayScene scene_;
+  std::shared_ptr<const std::vector<MeshEdge>> edges_;
   std::vector<std::array<Eigen::Vector2f, 3>> uv_;  // in texels
   std::vector<Eigen::Vector3f> nodes_;
   std::vector<std::uint8_t> slot_;

@@ -13,6 +13,10 @@ namespace lumihull::slf {
 struct RenderOptions {
   int rays = 2;        ///< n x n rays a pixel, 1 … 8
   bool depth = false;  ///< fill Rendering::depth
+  /// For speed: the n x n rays are cast only where the object's outlines pass through a pixel, or more than one
+  /// triangle lies in it; elsewhere one ray finds the triangle, and the n x n samples are taken on its plane. Alpha is
+  /// the same, colours nearly so.
+  bool adaptive = false;
 };
 
 /// A new view.
