@@ -16,7 +16,6 @@ namespace lumihull::slf {
 namespace {
 
 constexpr float kMinCosine = 0.5f;  // of a triangle's normal to its chart's axis
-constexpr float kReach = 1.4143f;   // texels: the farthest texel centre that interpolation inside a triangle touches
 constexpr float kSamePlace = 6;     // texels of the same chart that show places nearer than this are neighbours
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 constexpr int kBlock = 8;
@@ -36,32 +35,6 @@ struct Chart {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  // of the texels, inclusive
   int at_x = 0, at_y = 0;              // where the box's corner is in the texture
 };
-
-struct Nearest {
-  float distance2, b1, b2;
-};
-
-/// Nearest point of a 2-D triangle.
-Nearest nearest_in_triangle(const std::array<Eigen::Vector2f, 3>& t, const Eigen::Vector2f& p) {
-  const Eigen::Vector2f e1 = t[1] - t[0], e2 = t[2] - t[0], d = p - t[0];
-  const float area = e1.x() * e2.y() - e1.y() * e2.x();
-  if (area != 0) {
-    const float b1 = (d.x() * e2.y() - d.y() * e2.x()) / area, b2 = (e1.x() * d.y() - e1.y() * d.x()) / area;
-    if (b1 >= 0 && b2 >= 0 && b1 + b2 <= 1) return {0, b1, b2};
-  }
-  Nearest best{std::numeric_limits<float>::infinity(), 0, 0};
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector2f &a = t[i], e = t[(i + 1) % 3] - a;
-    const float length2 = e.squaredNorm();
-    const float s = length2 > 0 ? std::clamp((p - a).dot(e) / length2, 0.0f, 1.0f) : 0.0f;
-    const float distance2 = (a + s * e - p).squaredNorm();
-    if (distance2 >= best.distance2) continue;
-    std::array<float, 3> b{};
-    b[i] = 1 - s, b[(i + 1) % 3] = s;
-    best = {distance2, b[1], b[2]};
-  }
-  return best;
-}
 
 /// The triangle across each of the three edges (from corner i to corner i + 1), kNone at a border.
 std::vector<std::array<std::uint32_t, 3>> neighbours_of(const hull::Mesh& mesh) {
@@ -168,10 +141,10 @@ class Charter {
   /// Claims the texels of a triangle; false, and nothing claimed, where one of them shows another place already.
   bool add(Chart& chart, std::uint32_t triangle, bool must) {
     const auto p = project(chart, triangle);
-    const int x0 = int(std::ceil(std::min({p[0].x(), p[1].x(), p[2].x()}) - kReach - 0.5f));
-    const int x1 = int(std::floor(std::max({p[0].x(), p[1].x(), p[2].x()}) + kReach - 0.5f));
-    const int y0 = int(std::ceil(std::min({p[0].y(), p[1].y(), p[2].y()}) - kReach - 0.5f));
-    const int y1 = int(std::floor(std::max({p[0].y(), p[1].y(), p[2].y()}) + kReach - 0.5f));
+    const int x0 = int(std::ceil(std::min({p[0].x(), p[1].x(), p[2].x()}) - kTexelReach - 0.5f));
+    const int x1 = int(std::floor(std::max({p[0].x(), p[1].x(), p[2].x()}) + kTexelReach - 0.5f));
+    const int y0 = int(std::ceil(std::min({p[0].y(), p[1].y(), p[2].y()}) - kTexelReach - 0.5f));
+    const int y1 = int(std::floor(std::max({p[0].y(), p[1].y(), p[2].y()}) + kTexelReach - 0.5f));
     const bool empty = chart.triangles.empty();
     const int bx0 = empty ? x0 : std::min(x0, chart.x0), bx1 = empty ? x1 : std::max(x1, chart.x1);
     const int by0 = empty ? y0 : std::min(y0, chart.y0), by1 = empty ? y1 : std::max(y1, chart.y1);
@@ -183,8 +156,8 @@ class Charter {
     claims_.clear();
     for (int y = y0; y <= y1; ++y)
       for (int x = x0; x <= x1; ++x) {
-        const Nearest n = nearest_in_triangle(p, {float(x) + 0.5f, float(y) + 0.5f});
-        if (n.distance2 > kReach * kReach) continue;
+        const NearestPlace n = nearest_in_triangle(p, {float(x) + 0.5f, float(y) + 0.5f});
+        if (n.distance2 > kTexelReach * kTexelReach) continue;
         const Eigen::Vector3f place = a + n.b1 * e1 + n.b2 * e2;
         const auto old = owner_.find(key(x, y));
         if (old != owner_.end() &&
@@ -249,6 +222,27 @@ int pack(std::vector<Chart>& charts, int width) {
 }
 
 }  // namespace
+
+NearestPlace nearest_in_triangle(const std::array<Eigen::Vector2f, 3>& t, const Eigen::Vector2f& p) {
+  const Eigen::Vector2f e1 = t[1] - t[0], e2 = t[2] - t[0], d = p - t[0];
+  const float area = e1.x() * e2.y() - e1.y() * e2.x();
+  if (area != 0) {
+    const float b1 = (d.x() * e2.y() - d.y() * e2.x()) / area, b2 = (e1.x() * d.y() - e1.y() * d.x()) / area;
+    if (b1 >= 0 && b2 >= 0 && b1 + b2 <= 1) return {0, b1, b2};
+  }
+  NearestPlace best{std::numeric_limits<float>::infinity(), 0, 0};
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector2f &a = t[i], e = t[(i + 1) % 3] - a;
+    const float length2 = e.squaredNorm();
+    const float s = length2 > 0 ? std::clamp((p - a).dot(e) / length2, 0.0f, 1.0f) : 0.0f;
+    const float distance2 = (a + s * e - p).squaredNorm();
+    if (distance2 >= best.distance2) continue;
+    std::array<float, 3> b{};
+    b[i] = 1 - s, b[(i + 1) % 3] = s;
+    best = {distance2, b[1], b[2]};
+  }
+  return best;
+}
 
 Atlas make_atlas(const hull::Mesh& mesh, double texel_size, int max_side) {
   Eigen::AlignedBox3f box;

@@ -27,6 +27,15 @@ struct Atlas {
   std::vector<std::uint32_t> blocks;               // first texel of each block, and one past the last
 };
 
+/// The place of a 2-D triangle that is nearest to a point: (1 - b1 - b2) corner 0 + b1 corner 1 + b2 corner 2.
+struct NearestPlace {
+  float distance2, b1, b2;
+};
+NearestPlace nearest_in_triangle(const std::array<Eigen::Vector2f, 3>& corners, const Eigen::Vector2f& point);
+
+/// Texels: the farthest texel centre that bilinear interpolation inside a triangle touches.
+inline constexpr float kTexelReach = 1.4143f;
+
 /// Lays out a mesh: charts of connected triangles that are seen without overlap along one direction, projected along it
 /// (lengths shrink to no less than cos 60°), packed in rows. `texel_size`, in world units, is made larger as needed to
 /// fit into max_side².

@@ -16,7 +16,6 @@ namespace lumihull::slf {
 namespace {
 
 constexpr std::size_t kBlocksAtOnce = 32, kVerticesAtOnce = 64;
-constexpr float kTowardsMean = 0.003f;  // pulls view maps to 0 where nobody looks, in shares of the weight
 constexpr float kTowardsNodes = 0.05f;  // pulls a photograph's view maps to what the nodes say, in shares of the weight
 
 /// Polynomials of a direction, degree 1 to 3: smooth functions to start from.
@@ -238,38 +237,16 @@ void JointFit::fit_view(std::size_t p) {
 }
 
 /// The values at the nodes that agree best with the view maps found at the photographs, weighted by what is behind
-/// these, smooth over neighbouring nodes.
+/// these.
 void JointFit::fit_nodes(Job& job) {
-  const auto d = std::ptrdiff_t(nodes_.size());
+  const std::size_t size = nodes_.size() * terms_;
   parallel_chunks(job, vertices_, kVerticesAtOnce, [&](std::size_t first, std::size_t last) {
-    Eigen::MatrixXf normal(d, d), right(d, std::ptrdiff_t(terms_));
-    Eigen::LLT<Eigen::MatrixXf> cholesky(d);
+    NodeRegression regression(laplacian_, options_.view_smoothness, terms_);
     for (std::size_t v = first; v < last; ++v) {
-      float sum = 0;
-      int count = 0;
-      normal.setZero(), right.setZero();
-      for (std::size_t p = 0; p < photos_.size(); ++p) {
-        const float trust = trust_[p][v];
-        if (trust <= 0) continue;
-        sum += trust, ++count;
-        const NodeWeights& w = weights_[p][v];
-        const Eigen::Map<const Eigen::RowVectorXf> value(view_at(p, v), std::ptrdiff_t(terms_));
-        for (int i = 0; i < kNodesBlended; ++i) {
-          for (int j = 0; j < kNodesBlended; ++j) normal(w.node[i], w.node[j]) += trust * w.weight[i] * w.weight[j];
-          right.row(w.node[i]) += trust * w.weight[i] * value;
-        }
-      }
-      Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> out(
-          &factors_.view[v * nodes_.size() * terms_], d, std::ptrdiff_t(terms_));
-      if (count == 0) {
-        out.setZero();
-        continue;
-      }
-      const float ordinary = sum / float(count);
-      normal += float(options_.view_smoothness) * ordinary * laplacian_;
-      normal.diagonal().array() += kTowardsMean * ordinary;
-      cholesky.compute(normal);
-      out = cholesky.solve(right);
+      regression.clear();
+      for (std::size_t p = 0; p < photos_.size(); ++p)
+        if (trust_[p][v] > 0) regression.add(weights_[p][v], trust_[p][v], {view_at(p, v), terms_});
+      regression.solve({&factors_.view[v * size], size});
     }
   });
 }

@@ -4,11 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include "atlas.h"
 #include "color.h"
 #include "joint_fit.h"
+#include "light_field_terms.h"
 #include "photo_options.h"
+#include "ring_fit.h"
+#include "rings.h"
 #include "surface_fill.h"
 #include "surface_samples.h"
 #include "surface_viewer.h"
@@ -16,8 +20,6 @@
 
 namespace lumihull::slf {
 namespace {
-
-constexpr double kClipped = 1e-4;  // share of the values that the byte range leaves out at each end
 
 void check(const LightFieldOptions& o) {
   constexpr const char* kWhose = "light field options";
@@ -31,19 +33,25 @@ void check(const LightFieldOptions& o) {
   check_photo_options(o, kWhose);
 }
 
-/// The range that holds all values but a few outliers, around zero so that zero is a byte's value.
-ByteScale range_of(std::vector<float> values) {
-  if (values.empty()) return {};
-  for (float& v : values) v = std::abs(v);
-  const auto at = values.begin() + std::ptrdiff_t(double(values.size() - 1) * (1 - kClipped));
-  std::nth_element(values.begin(), at, values.end());
-  const float most = std::max(*at, 1e-6f);
-  // 128 stands for zero.
-  return {2 * most * 255 / 254, -2 * most * 128 / 254};
+/// The mean colour of each texel, all of them known; how many had to be filled in.
+std::vector<BlendColor> mean_colors(const hull::Mesh& mesh, const Atlas& atlas, const JointFactors& factors,
+                                    std::size_t& filled) {
+  std::vector<BlendColor> colors(atlas.texels.size());
+  for (std::size_t i = 0; i < colors.size(); ++i) {
+    const float w = factors.seen[i];
+    colors[i] = {w * factors.mean[3 * i], w * factors.mean[3 * i + 1], w * factors.mean[3 * i + 2], w};
+  }
+  filled = fill_surface(mesh, atlas, colors);
+  return colors;
 }
 
-std::uint8_t to_byte(float value, const ByteScale& s) {
-  return std::uint8_t(std::clamp((value - s.offset) / s.scale * 255 + 0.5f, 0.0f, 255.0f));
+std::vector<Eigen::Vector3f> nodes_of(const hull::Mesh& mesh, std::span<const PhotoSamples> samples, std::size_t most) {
+  std::vector<Eigen::Vector3f> places, nodes;
+  for (const PhotoSamples& p : samples) places.push_back(p.center);
+  Eigen::AlignedBox3f box;
+  for (const auto& v : mesh.vertices) box.extend(v);
+  for (const std::uint32_t i : choose_nodes(places, box.center(), most)) nodes.push_back(places[i]);
+  return nodes;
 }
 
 }  // namespace
@@ -55,6 +63,7 @@ void validate(const LightField& field, const std::string& name) {
   if (field.nodes.empty() || field.nodes.size() > std::size_t(kMaxNodes)) fail("expected 1 to 255 nodes");
   for (const auto& n : field.nodes)
     if (!n.allFinite()) fail("a node's place is not finite");
+  if (!field.up.allFinite() || std::abs(field.up.norm() - 1) > 1e-3f) fail("expected an up of unit length");
   std::size_t slots = 1;
   if (!field.slot.empty()) {
     if (field.slot.size() != vertices) fail("expected a slot for each vertex");
@@ -62,9 +71,9 @@ void validate(const LightField& field, const std::string& name) {
     if (slots > std::size_t(kMaxSlots)) fail("expected slots below 16");
     for (std::size_t i = 0; i < field.base.mesh.triangles.size(); ++i) {
       const auto& t = field.base.mesh.triangles[i];
-      if (field.slot[t[0]] == field.slot[t[1]] || field.slot[t[1]] == field.slot[t[2]] ||
-          field.slot[t[2]] == field.slot[t[0]])
-        fail("triangle " + std::to_string(i) + " has two corners of one slot");
+      for (int j = 0; j < 3; ++j)
+        if (t[j] != t[(j + 1) % 3] && field.slot[t[j]] == field.slot[t[(j + 1) % 3]])
+          fail("triangle " + std::to_string(i) + " has two corners of one slot");
     }
   }
   if (field.terms.size() > std::size_t(kMaxTerms)) fail("expected at most 12 terms");
@@ -93,6 +102,11 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
                 "a light field needs at least three photographs, not " + std::to_string(photos.size()));
   if (mesh.triangles.empty()) throw Error(ErrorCode::degenerate, "the mesh has no triangles to colour");
 
+  const bool joint = options.method == Factorization::joint, non_negative = options.method == Factorization::nmf;
+  const bool rings_apart = !joint && options.terms > 0;
+  std::vector<std::uint8_t> slot;
+  if (rings_apart) slot = slots_of(mesh);
+
   const hull::RayScene scene(mesh);
   const Atlas atlas = make_atlas(mesh, options.texel_px * finest_pixel(mesh, photos), options.max_side);
   std::vector<PhotoSamples> samples;
@@ -104,57 +118,37 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
 
   LightField field;
   field.base.mesh = mesh;
-  std::vector<Eigen::Vector3f> places;
-  for (const PhotoSamples& p : samples) places.push_back(p.center);
-  Eigen::AlignedBox3f box;
-  for (const auto& v : mesh.vertices) box.extend(v);
-  for (const std::uint32_t i : choose_nodes(places, box.center(), std::size_t(options.max_nodes)))
-    field.nodes.push_back(places[i]);
+  field.nodes = nodes_of(mesh, samples, std::size_t(options.max_nodes));
+  field.adds_base = !non_negative || options.terms == 0;
 
   JointFit fit(mesh, atlas, samples, field.nodes,
-               {options.terms, options.iterations, options.surface_ridge, options.view_smoothness});
+               {joint ? options.terms : 0, options.iterations, options.surface_ridge, options.view_smoothness});
   const JointFactors factors = fit.run(job);
-
-  const std::size_t texels = atlas.texels.size(), terms = std::size_t(options.terms);
-  std::vector<BlendColor> colors(texels);
-  for (std::size_t i = 0; i < texels; ++i) {
-    const float w = factors.seen[i];
-    colors[i] = {w * factors.mean[3 * i], w * factors.mean[3 * i + 1], w * factors.mean[3 * i + 2], w};
-  }
-  const std::size_t filled = fill_surface(mesh, atlas, colors);
+  double rms = fit.rms;
+  std::size_t filled = 0;
+  const std::vector<BlendColor> colors = mean_colors(mesh, atlas, factors, filled);
   field.base.texture = texture_picture(atlas, colors);
   field.base.uv = atlas.uv;
   const Eigen::Vector2f size(float(atlas.width), float(atlas.height));
   for (auto& corners : field.base.uv)
     for (auto& uv : corners) uv = uv.cwiseQuotient(size).cwiseMax(0.0f).cwiseMin(1.0f);
 
-  const std::size_t vertices = mesh.vertices.size(), nodes = field.nodes.size();
-  for (std::size_t k = 0; k < terms; ++k) {
-    LightFieldTerm term;
-    std::vector<float> values(texels * 3);
-    for (std::size_t i = 0; i < texels; ++i) std::copy_n(&factors.surface[(i * terms + k) * 3], 3, &values[3 * i]);
-    term.surface_scale = range_of(values);
-    for (std::size_t i = 0; i < texels; ++i) {
-      const auto unit = [&](std::size_t c) {
-        return float(to_byte(values[3 * i + c], term.surface_scale)) * (1.0f / 255.0f);
-      };
-      colors[i] = {unit(0), unit(1), unit(2), 1};
-    }
-    term.surface.push_back(texture_picture(atlas, colors));
-    values.resize(vertices * nodes);
-    for (std::size_t v = 0; v < vertices; ++v)
-      for (std::size_t i = 0; i < nodes; ++i) values[i * vertices + v] = factors.view[(v * nodes + i) * terms + k];
-    term.view_scale = range_of(values);
-    term.view.resize(values.size());
-    for (std::size_t i = 0; i < values.size(); ++i) term.view[i] = to_byte(values[i], term.view_scale);
-    field.terms.push_back(std::move(term));
+  if (joint) {
+    field.terms = terms_of(factors, atlas, mesh.vertices.size(), field.nodes.size(), std::size_t(options.terms));
+  } else if (rings_apart) {
+    Rings rings = make_rings(mesh, atlas, std::move(slot));
+    const RingFitOptions ring_options{non_negative, options.terms, options.view_smoothness};
+    const RingFactors ring_factors = fit_rings(mesh, atlas, rings, samples, field.nodes, colors, ring_options, job);
+    field.terms = terms_of(ring_factors, atlas, rings, field.nodes.size(), ring_options);
+    field.slot = std::move(rings.slot);
+    rms = ring_factors.rms;
   }
   if (report) {
     report->texel_size = atlas.texel_size;
-    report->unseen_share = double(filled) / double(std::max<std::size_t>(1, texels));
+    report->unseen_share = double(filled) / double(std::max<std::size_t>(1, atlas.texels.size()));
     report->samples = 0;
     for (const PhotoSamples& p : samples) report->samples += p.samples.size();
-    report->rms = fit.rms;
+    report->rms = rms;
     report->rms_of_mean = fit.rms_of_mean;
   }
   return field;

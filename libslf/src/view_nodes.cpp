@@ -11,6 +11,7 @@ namespace {
 
 constexpr float kSamePlace = 0.0017f;  // rad
 constexpr int kNeighbours = 4;
+constexpr float kTowardsMean = 0.003f;  // pulls values to 0 where nobody looks, in shares of the ordinary trust
 
 /// Angle between unit vectors, accurate where it is small.
 float angle_between(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
@@ -97,6 +98,43 @@ Eigen::MatrixXf node_laplacian(std::span<const Eigen::Vector3f> nodes, const Eig
   const float mean = n > 0 ? laplacian.diagonal().mean() : 0;
   if (mean > 0) laplacian /= mean;
   return laplacian;
+}
+
+NodeRegression::NodeRegression(const Eigen::MatrixXf& laplacian, double smoothness, std::size_t terms)
+    : laplacian_(laplacian),
+      smoothness_(float(smoothness)),
+      normal_(laplacian.rows(), laplacian.rows()),
+      right_(laplacian.rows(), std::ptrdiff_t(terms)),
+      cholesky_(laplacian.rows()) {
+  clear();
+}
+
+void NodeRegression::clear() {
+  sum_ = 0, count_ = 0;
+  normal_.setZero(), right_.setZero();
+}
+
+void NodeRegression::add(const NodeWeights& w, float trust, std::span<const float> values) {
+  sum_ += trust, ++count_;
+  const Eigen::Map<const Eigen::RowVectorXf> value(values.data(), right_.cols());
+  for (int i = 0; i < kNodesBlended; ++i) {
+    for (int j = 0; j < kNodesBlended; ++j) normal_(w.node[i], w.node[j]) += trust * w.weight[i] * w.weight[j];
+    right_.row(w.node[i]) += trust * w.weight[i] * value;
+  }
+}
+
+void NodeRegression::solve(std::span<float> out) {
+  Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> values(out.data(), right_.rows(),
+                                                                                           right_.cols());
+  if (count_ == 0) {
+    values.setZero();
+    return;
+  }
+  const float ordinary = sum_ / float(count_);
+  normal_ += smoothness_ * ordinary * laplacian_;
+  normal_.diagonal().array() += kTowardsMean * ordinary;
+  cholesky_.compute(normal_);
+  values = cholesky_.solve(right_);
 }
 
 }  // namespace lumihull::slf

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -30,5 +32,27 @@ std::vector<std::uint32_t> choose_nodes(std::span<const Eigen::Vector3f> places,
 /// Graph Laplacian over nodes (symmetric, positive semidefinite, rows sum to 0): each node and its four nearest in
 /// direction from `center`, weighted by 1/angle², scaled so that the diagonal's mean is 1.
 Eigen::MatrixXf node_laplacian(std::span<const Eigen::Vector3f> nodes, const Eigen::Vector3f& center);
+
+/// The values at the nodes of one vertex that agree best with values at other places, weighted by the trust in these:
+/// smooth over neighbouring nodes, and drawn to 0 where nothing is known nearby.
+class NodeRegression {
+ public:
+  /// laplacian: see node_laplacian; must outlive the object. smoothness: in shares of the ordinary trust.
+  NodeRegression(const Eigen::MatrixXf& laplacian, double smoothness, std::size_t terms);
+
+  void clear();
+  /// `values` of all terms at a place that has these weights.
+  void add(const NodeWeights& weights, float trust, std::span<const float> values);
+  /// nodes x terms; all 0 where nothing was added.
+  void solve(std::span<float> out);
+
+ private:
+  const Eigen::MatrixXf& laplacian_;
+  float smoothness_;
+  float sum_ = 0;
+  int count_ = 0;
+  Eigen::MatrixXf normal_, right_;
+  Eigen::LLT<Eigen::MatrixXf> cholesky_;
+};
 
 }  // namespace lumihull::slf

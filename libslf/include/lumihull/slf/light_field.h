@@ -60,14 +60,22 @@ inline constexpr int kMaxSlots = 16;
 /// Throws Error{bad_input} where counts and sizes do not fit together.
 LUMIHULL_API void validate(const LightField& field, const std::string& name);
 
+/// How a light field is factored.
+enum class Factorization {
+  joint,  ///< all vertices together, over common surface maps
+  pca,    ///< each vertex's ring of triangles by itself: principal components of the residual over the mean colour
+  nmf,    ///< the same of the colours themselves, non-negative; terms are not to be left out
+};
+
 struct LightFieldOptions {
-  int terms = 6;        ///< products beyond the mean colour, 0 … kMaxTerms
+  Factorization method = Factorization::joint;
+  int terms = 6;        ///< products beyond the mean colour (nmf: in all), 0 … kMaxTerms
   int max_nodes = 96;   ///< places where view maps have values: photographs' places, as many of them at most; 4 … 255
   int max_side = 2048;  ///< largest width and height of the maps, 64 … 16384
   double texel_px = 1;  ///< size of a texel in pixels of the photographs, at the median over the surface
-  int iterations = 8;   ///< alternations between surface and view maps, 1 … 100
+  int iterations = 8;   ///< joint: alternations between surface and view maps, 1 … 100
   double surface_ridge =
-      0.05;  ///< pulls surface maps towards 0 where photographs say little, in shares of their weight
+      0.05;  ///< joint: pulls surface maps towards 0 where photographs say little, in shares of their weight
   double view_smoothness = 0.02;  ///< pulls neighbouring nodes' values together, in shares of the photographs' weight
   double min_cosine = 0.15;       ///< flatter views count next to nothing, 0 … 1
   double visibility_offset =
@@ -88,7 +96,8 @@ struct LightFieldReport {
 };
 
 /// Factors the photographs' appearance on a mesh. Errors: invalid_argument (options), bad_input (mesh, views),
-/// degenerate (fewer than three photographs, no triangles), and whatever the photographs' reader throws.
+/// degenerate (fewer than three photographs, no triangles), unsupported (pca and nmf: the mesh's vertices need more
+/// than kMaxSlots slots), and whatever the photographs' reader throws.
 LUMIHULL_API LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos,
                                         const LightFieldOptions& options, Job& job, LightFieldReport* report = nullptr);
 

@@ -1,0 +1,91 @@
+#include "light_field_terms.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+#include "byte_scale.h"
+#include "color.h"
+#include "surface_fill.h"
+
+namespace lumihull::slf {
+namespace {
+
+constexpr double kClippedViews = 1e-4;  // share of the non-negative view maps' values that bytes leave out
+
+using Bytes = std::array<std::uint8_t, 3>;
+
+BlendColor as_color(const Bytes& b) { return {unit_of_srgb8(b[0]), unit_of_srgb8(b[1]), unit_of_srgb8(b[2]), 1}; }
+
+/// Term `k` of view maps (vertices x nodes x terms), node by node.
+void set_view(const std::vector<float>& view, std::size_t vertices, std::size_t nodes, std::size_t terms, std::size_t k,
+              bool non_negative, LightFieldTerm& term) {
+  std::vector<float> values(vertices * nodes);
+  for (std::size_t v = 0; v < vertices; ++v)
+    for (std::size_t i = 0; i < nodes; ++i) values[i * vertices + v] = view[(v * nodes + i) * terms + k];
+  term.view_scale = non_negative ? positive_range_of(values, kClippedViews) : signed_range_of(values);
+  term.view.resize(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) term.view[i] = to_byte(values[i], term.view_scale);
+}
+
+/// Term `k` of surface maps (rows x terms x 3) by itself: rows x 3.
+std::vector<float> surface_of(const std::vector<float>& surface, std::size_t terms, std::size_t k) {
+  std::vector<float> out(surface.size() / terms);
+  for (std::size_t i = 0; i < out.size() / 3; ++i) std::copy_n(&surface[(i * terms + k) * 3], 3, &out[3 * i]);
+  return out;
+}
+
+}  // namespace
+
+std::vector<LightFieldTerm> terms_of(const JointFactors& factors, const Atlas& atlas, std::size_t vertices,
+                                     std::size_t nodes, std::size_t terms) {
+  std::vector<LightFieldTerm> out(terms);
+  std::vector<BlendColor> texels(atlas.texels.size());
+  for (std::size_t k = 0; k < terms; ++k) {
+    const std::vector<float> values = surface_of(factors.surface, terms, k);
+    const ByteScale scale = out[k].surface_scale = signed_range_of(values);
+    for (std::size_t i = 0; i < texels.size(); ++i)
+      texels[i] = as_color(
+          {to_byte(values[3 * i], scale), to_byte(values[3 * i + 1], scale), to_byte(values[3 * i + 2], scale)});
+    out[k].surface.push_back(texture_picture(atlas, texels));
+    set_view(factors.view, vertices, nodes, terms, k, false, out[k]);
+  }
+  return out;
+}
+
+std::vector<LightFieldTerm> terms_of(const RingFactors& factors, const Atlas& atlas, const Rings& rings,
+                                     std::size_t nodes, const RingFitOptions& options) {
+  const std::size_t vertices = rings.slot.size(), terms = std::size_t(options.terms);
+  const int slots = *std::max_element(rings.slot.begin(), rings.slot.end()) + 1;
+  std::vector<LightFieldTerm> out(terms);
+  for (std::size_t k = 0; k < terms; ++k) {
+    const std::vector<float> values = surface_of(factors.surface, terms, k);
+    const ByteScale scale = out[k].surface_scale =
+        options.non_negative ? positive_range_of(values, 0) : signed_range_of(values);
+    const std::uint8_t zero = to_byte(0, scale);
+    // What rounding took from a texel in one slot is made good in the next one: neighbours' view maps are alike, and a
+    // plain surface stays plain. (Signed view maps are not: principal components have any sign.)
+    std::vector<float> owed(options.non_negative ? 3 * atlas.texels.size() : 0, 0.0f);
+    for (int slot = 0; slot < slots; ++slot) {
+      std::vector<BlendColor> texels(atlas.texels.size(), as_color({zero, zero, zero}));
+      for (std::size_t v = 0; v < vertices; ++v) {
+        if (rings.slot[v] != slot) continue;
+        for (std::size_t i = rings.first[v]; i < rings.first[v + 1]; ++i) {
+          const std::size_t texel = rings.texels[i].texel;
+          Bytes bytes;
+          for (std::size_t c = 0; c < 3; ++c) {
+            const float wanted = values[3 * i + c] + (owed.empty() ? 0.0f : owed[3 * texel + c]);
+            bytes[c] = to_byte(wanted, scale);
+            if (!owed.empty()) owed[3 * texel + c] = wanted - scale.scale * unit_of_srgb8(bytes[c]);
+          }
+          texels[texel] = as_color(bytes);
+        }
+      }
+      out[k].surface.push_back(texture_picture(atlas, texels));
+    }
+    set_view(factors.view, vertices, nodes, terms, k, options.non_negative, out[k]);
+  }
+  return out;
+}
+
+}  // namespace lumihull::slf

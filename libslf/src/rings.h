@@ -1,0 +1,44 @@
+#pragma once
+
+#include <lumihull/hull/mesh.h>
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "atlas.h"
+
+namespace lumihull::slf {
+
+/// A texel of a vertex's ring, and the vertex's share of it (its hat function Λ there).
+struct RingTexel {
+  std::uint32_t texel;
+  float share;  // > 0, at most 1
+};
+
+/// The surroundings of all vertices in an atlas, and the pictures (slots) that have room for the maps of all of them.
+///
+/// Bilinear interpolation near a triangle's edge reads texels that show the triangle beyond it. So that the slots of
+/// the triangle's corners sum to 1 there as well, such a texel also has a share for them, in slots that the triangle
+/// beyond leaves free: rings reach a texel beyond their triangles, and hats are a little blunt near vertices.
+struct Rings {
+  std::vector<std::uint8_t> slot;                      // of each vertex
+  std::vector<std::uint32_t> first;                    // of each vertex, in `texels`, and one past the last
+  std::vector<RingTexel> texels;                       // ring by ring, ascending
+  std::vector<std::array<std::uint32_t, 3>> of_texel;  // where the corners of a texel's triangle have it; kNoShare
+
+  std::span<const RingTexel> of(std::size_t vertex) const {
+    return {&texels[first[vertex]], first[vertex + 1] - first[vertex]};
+  }
+};
+inline constexpr std::uint32_t kNoShare = ~std::uint32_t(0);
+
+/// A slot for each vertex, no two of a triangle alike: the smallest that is free, vertices in order of falling degree.
+/// Throws Error{unsupported} where kMaxSlots slots do not suffice.
+std::vector<std::uint8_t> slots_of(const hull::Mesh& mesh);
+
+/// slot: see slots_of.
+Rings make_rings(const hull::Mesh& mesh, const Atlas& atlas, std::vector<std::uint8_t> slot);
+
+}  // namespace lumihull::slf
