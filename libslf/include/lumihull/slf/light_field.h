@@ -49,6 +49,7 @@ struct LightField {
   TexturedMesh base;
   bool adds_base = true;
   std::vector<Eigen::Vector3f> nodes;  ///< world, 1 … 255
+  Eigen::Vector3f up{0, 0, 1};         ///< the photographs' (see up_axis), unit length: turntables turn about it
   std::vector<std::uint8_t> slot;      ///< of each vertex, no two of a triangle alike; empty: common surface maps
   std::vector<LightFieldTerm> terms;
 };
