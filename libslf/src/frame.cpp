@@ -93,7 +93,7 @@ Tile Frame::tile(std::size_t i) const {
 SurfaceSample Frame::sample(std::uint32_t pixel, const hull::Hit& hit) const {
   const auto& t = mesh_.triangles[hit.triangle];
   const Eigen::Vector3f &a = mesh_.vertices[t[0]], &b = mesh_.vertices[t[1]], &c = mesh_.vertices[t[2]];
-  return {pixel, hit, a + hit.b1 * (b - a) + hit.b2 * (c - a)};
+  return {pixel, hit, a + hit.b1 * (b - a) + hit.b2 * (c - a), false};
 }
 
 /// n x n rays for each of the pixels; hits in their order.
@@ -140,7 +140,7 @@ bool Frame::Plane::holds(int n) const {
 std::vector<SurfaceSample> Frame::trace(const Tile& tile) const {
   std::vector<SurfaceSample> samples;
   if (!rays_.bounds(tile.x0, tile.y0, tile.width, tile.height).intersects(seen_)) return samples;
-  const int n = options_.rays;
+  const int n = options_.rays, inside = n > 2 ? (n + 1) / 2 : n;
   const std::size_t per_pixel = std::size_t(n * n), count = std::size_t(tile.width) * std::size_t(tile.height);
 
   // Pixels in the order of their rays: squares of so many that their rays fill a packet.
@@ -166,14 +166,14 @@ std::vector<SurfaceSample> Frame::trace(const Tile& tile) const {
     for (std::size_t i = 0; i < single.size(); ++i) {
       if (!centers[i]) continue;
       const Plane p = plane(centers[i], slopes);
-      if (p.holds(n)) {
+      if (p.holds(inside)) {
         plane_of[single[i]] = std::uint32_t(planes.size());
         planes.push_back(p);
       } else {
         many.push_back(single[i]);
       }
     }
-    most = planes.size() * per_pixel;
+    most = planes.size() * std::size_t(inside * inside);
   }
   const std::vector<hull::Hit> hits = cast(tile, many, n);
   for (std::size_t i = 0; i < many.size(); ++i) first_hit[many[i]] = std::uint32_t(i * per_pixel);
@@ -181,10 +181,12 @@ std::vector<SurfaceSample> Frame::trace(const Tile& tile) const {
   samples.reserve(most + hits.size());
   for (std::uint32_t pixel = 0; pixel < count; ++pixel) {
     if (plane_of[pixel] != kNone) {
-      for (int j = 0; j < n; ++j)
-        for (int i = 0; i < n; ++i)
-          samples.push_back(sample(pixel, planes[plane_of[pixel]].at({(float(i) + 0.5f) / float(n) - 0.5f,
-                                                                      (float(j) + 0.5f) / float(n) - 0.5f})));
+      for (int j = 0; j < inside; ++j)
+        for (int i = 0; i < inside; ++i) {
+          const Eigen::Vector2f off((float(i) + 0.5f) / float(inside) - 0.5f, (float(j) + 0.5f) / float(inside) - 0.5f);
+          samples.push_back(sample(pixel, planes[plane_of[pixel]].at(off)));
+          samples.back().whole = true;
+        }
     } else if (first_hit[pixel] != kNone) {
       for (std::size_t k = first_hit[pixel]; k < first_hit[pixel] + per_pixel; ++k)
         if (hits[k]) samples.push_back(sample(pixel, hits[k]));
@@ -217,7 +219,8 @@ void Frame::resolve(const Tile& tile, const std::vector<SurfaceSample>& samples,
     } else {
       holes_[tile_index].push_back(std::uint32_t(y) * std::uint32_t(view_.camera.width) + std::uint32_t(x));
     }
-    out[3] = std::uint8_t((int(last - first) * 255 + per_pixel / 2) / per_pixel);
+    const int hits = samples[first].whole ? per_pixel : int(last - first);
+    out[3] = std::uint8_t((hits * 255 + per_pixel / 2) / per_pixel);
     if (!out_.depth.empty()) out_.depth.row<float>(y)[x] = depth;
     first = last;
   }

@@ -20,6 +20,7 @@ struct SurfaceSample {
   std::uint32_t pixel;  // within the tile, y * width + x; a pixel's samples follow one another
   hull::Hit hit;        // t = depth: z in the camera's frame
   Eigen::Vector3f point;
+  bool whole;  // the pixel's samples stand for all of its rays, however many there are
 };
 
 struct Tile {

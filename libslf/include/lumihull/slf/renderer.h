@@ -13,9 +13,9 @@ namespace lumihull::slf {
 struct RenderOptions {
   int rays = 2;        ///< n x n rays a pixel, 1 … 8
   bool depth = false;  ///< fill Rendering::depth
-  /// For speed: the n x n rays are cast only where the object's outlines pass through a pixel, or more than one
-  /// triangle lies in it; elsewhere one ray finds the triangle, and the n x n samples are taken on its plane. Alpha is
-  /// the same, colours nearly so.
+  /// For speed: the n x n rays are cast only where one of the object's outlines passes through a pixel, or a pixel is
+  /// not well inside of a triangle; elsewhere one ray finds the triangle, and samples are taken on its plane (2 x 2 for
+  /// n = 2 … 4, 3 x 3 and 4 x 4 for more). Alpha is the same as without; colours nearly so.
   bool adaptive = false;
 };
 
