@@ -111,7 +111,7 @@ slf::LightField light_field(const slf::TexturedMesh& base, int terms, int nodes,
 /// Embree by itself.
 class Peer {
  public:
-  Peer(const hull::Mesh& mesh, const View& view, int n) : width_(view.camera.width), n_(n) {
+  Peer(const hull::Mesh& mesh, const View& view, int n) {
     device_ = rtcNewDevice(nullptr);
     scene_ = rtcNewScene(device_);
     RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -177,7 +177,6 @@ class Peer {
 
   RTCDevice device_;
   RTCScene scene_;
-  int width_, n_;
   bool wide_;
   float eye_[3];
   std::vector<float> directions_;
