@@ -58,7 +58,16 @@ Eigen::Vector3d up_axis(std::span<const View> views) {
   return sum.norm() > 1e-6 * double(views.size()) ? Eigen::Vector3d(sum.normalized()) : Eigen::Vector3d::UnitZ();
 }
 
-std::vector<PathView> turntable(const hull::Mesh& mesh, std::span<const View> photographs, const TurntableOptions& o) {
+std::vector<PathView> turntable(const hull::Mesh& mesh, std::span<const View> photographs,
+                                const TurntableOptions& options) {
+  const Eigen::Vector3d somewhere =
+      mesh.vertices.empty() ? Eigen::Vector3d(1, 0, 0)
+                            : Eigen::Vector3d(mesh.vertices[0].cast<double>() + Eigen::Vector3d(1e6, 0, 0));
+  return turntable(mesh, up_axis(photographs), photographs.empty() ? somewhere : photographs[0].center(), options);
+}
+
+std::vector<PathView> turntable(const hull::Mesh& mesh, const Eigen::Vector3d& axis, const Eigen::Vector3d& first,
+                                const TurntableOptions& o) {
   require(o.frames >= 1 && o.frames <= kMostViews, "frames: expected 1 to 100000");
   require(o.elevation_deg >= -90 && o.elevation_deg <= 90, "elevation_deg: expected -90 to 90");
   require(o.distance >= 0 && std::isfinite(o.distance), "distance: expected 0 or more");
@@ -69,13 +78,13 @@ std::vector<PathView> turntable(const hull::Mesh& mesh, std::span<const View> ph
   require(o.field_of_view_deg >= 1 && o.field_of_view_deg <= 150, "field_of_view_deg: expected 1 to 150");
   if (mesh.triangles.empty()) throw Error(ErrorCode::degenerate, "the mesh has no triangles to turn around");
 
-  const Eigen::Vector3d up = up_axis(photographs);
+  require(axis.allFinite() && axis.norm() > 0 && first.allFinite(), "up, first: expected finite vectors, and an axis");
+  const Eigen::Vector3d up = axis.normalized();
   Eigen::AlignedBox3d box;
   for (const auto& t : mesh.triangles)
     for (const auto v : t) box.extend(mesh.vertices[v].cast<double>());
   const Eigen::Vector3d middle = box.center();
-  Eigen::Vector3d right =
-      photographs.empty() ? Eigen::Vector3d(1, 0, 0) : Eigen::Vector3d(photographs[0].center() - middle);
+  Eigen::Vector3d right = first - middle;
   right -= right.dot(up) * up;
   if (!(right.norm() > 1e-9 * box.diagonal().norm())) right = up.unitOrthogonal();
   right.normalize();

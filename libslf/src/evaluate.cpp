@@ -1,13 +1,15 @@
 #include <lumihull/base/error.h>
-#include <lumihull/internal/json.h>
+#include <lumihull/slf/camera_path.h>
 #include <lumihull/slf/evaluate.h>
 #include <lumihull/slf/glb.h>
 #include <lumihull/slf/light_field_glb.h>
 #include <lumihull/slf/photos.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <optional>
 
 #include "stage.h"
@@ -16,7 +18,6 @@ namespace lumihull::slf {
 namespace {
 
 namespace fs = std::filesystem;
-using internal::Json;
 
 /// Mean of the values that are known.
 class KnownMean {
@@ -71,35 +72,86 @@ Image side_by_side(const Image& reference, const Image& picture) {
   return out;
 }
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+class MeanQualities {
+ public:
+  void add(const std::map<std::string, PictureQuality>& methods) {
+    for (const auto& [name, q] : methods) {
+      auto& m = sums_[name];
+      m[0].add(q.psnr), m[1].add(q.ssim), m[2].add(q.psnr_inside), m[3].add(q.ssim_inside);
+    }
+  }
+  std::map<std::string, PictureQuality> value() const {
+    std::map<std::string, PictureQuality> out;
+    for (const auto& [name, m] : sums_) out[name] = {m[0].value(), m[1].value(), m[2].value(), m[3].value()};
+    return out;
+  }
 
-Json methods_json(const std::map<std::string, PictureQuality>& methods) {
-  Json out = Json::object();
-  for (const auto& [name, q] : methods)
-    out[name] = {{"psnr", number(q.psnr)},
-                 {"ssim", number(q.ssim)},
-                 {"psnr_inside", number(q.psnr_inside)},
-                 {"ssim_inside", number(q.ssim_inside)}};
-  return out;
-}
+ private:
+  std::map<std::string, std::array<KnownMean, 4>> sums_;
+};
 
 ViewEvaluation mean_of(const std::vector<ViewEvaluation>& views) {
   ViewEvaluation mean;
   KnownMean iou, keyed;
-  std::map<std::string, std::array<KnownMean, 4>> methods;
+  MeanQualities methods;
   for (const ViewEvaluation& view : views) {
     iou.add(view.silhouette_iou);
     keyed.add(view.keyed_iou);
-    for (const auto& [name, q] : view.methods) {
-      auto& m = methods[name];
-      m[0].add(q.psnr), m[1].add(q.ssim), m[2].add(q.psnr_inside), m[3].add(q.ssim_inside);
-    }
+    methods.add(view.methods);
   }
   mean.name = "mean";
   mean.silhouette_iou = iou.value();
   mean.keyed_iou = keyed.value();
-  for (const auto& [name, m] : methods) mean.methods[name] = {m[0].value(), m[1].value(), m[2].value(), m[3].value()};
+  mean.methods = methods.value();
   return mean;
+}
+
+/// What is judged, by its name in the evaluation.
+using Methods = std::map<std::string, std::function<Rendering(const View&)>>;
+
+/// A picture of the test views' folder that fits the camera.
+Image test_picture(const fs::path& file, const Camera& camera, int channels) {
+  Image image = read_image(file, {.channels = channels});
+  if (image.type() != PixelType::u8) image = converted(image, PixelType::u8, channels);
+  if (image.width() != camera.width || image.height() != camera.height)
+    throw Error(ErrorCode::bad_input,
+                "expected a picture of " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
+                    " pixels, not " + std::to_string(image.width()) + " x " + std::to_string(image.height()),
+                file.string());
+  return image;
+}
+
+TestViewEvaluation evaluate_test_views(const fs::path& folder, const Methods& methods,
+                                       const std::array<std::uint8_t, 3>& background, Job& job) {
+  const std::vector<PathView> views = read_camera_path(folder / "test_views.json");
+  const fs::path truth_file = folder / "test_highlights.json";
+  std::vector<ViewHighlights> truth;
+  if (file_exists(truth_file)) truth = read_highlights(truth_file);
+  if (!truth.empty() && truth.size() != views.size())
+    throw Error(ErrorCode::bad_input, "expected the highlights of " + std::to_string(views.size()) + " views",
+                truth_file.string());
+  TestViewEvaluation out;
+  out.views = views.size();
+  MeanQualities means;
+  std::map<std::string, std::vector<Image>> pictures;
+  for (const PathView& v : views) {
+    job.check();
+    const Image photo = test_picture(folder / "test_views" / (v.name + ".png"), v.view.camera, 3);
+    const Image mask = test_picture(folder / "test_views" / "masks" / (v.name + ".png"), v.view.camera, 1);
+    const Image reference = composited(photo, mask, background);
+    std::map<std::string, PictureQuality> qualities;
+    for (const auto& [name, render] : methods) {
+      Image picture = composited(render(v.view).rgba, background);
+      qualities[name] = compare_pictures(picture, reference, mask);
+      if (!truth.empty()) pictures[name].push_back(std::move(picture));
+    }
+    if (!truth.empty()) pictures["photograph"].push_back(reference);
+    means.add(qualities);
+  }
+  out.methods = means.value();
+  for (const auto& [name, of_method] : pictures)
+    out.highlights[name] = follow_highlight(of_method, pictures["photograph"], pictures["mean_texture"], truth);
+  return out;
 }
 
 }  // namespace
@@ -108,29 +160,6 @@ std::optional<fs::path> reference_mask_file(const fs::path& folder, const std::s
   for (const char* extension : {".png", ".jpg", ".jpeg", ".tif", ".tiff"})
     if (fs::path file = folder / (name + extension); file_exists(file)) return file;
   return std::nullopt;
-}
-
-std::string Evaluation::to_json() const {
-  Json out;
-  out["photos_used"] = photos_used;
-  out["photos_held_out"] = photos_held_out;
-  out["silhouette_iou"] = number(mean.silhouette_iou);
-  if (!std::isnan(mean.keyed_iou)) out["keyed_iou"] = mean.keyed_iou;
-  out["triangles"] = triangles;
-  out["model_bytes"] = model_bytes;
-  if (light_field_bytes) out["light_field_bytes"] = light_field_bytes;
-  out["methods"] = methods_json(mean.methods);
-  out["stages"] = Json::object();
-  for (const auto& [name, record] : stages)
-    out["stages"][name] = {{"seconds", record.seconds}, {"peak_bytes", record.peak_bytes}};
-  out["views"] = Json::array();
-  for (const ViewEvaluation& view : views) {
-    Json v = {{"name", view.name}, {"silhouette_iou", number(view.silhouette_iou)}};
-    if (!std::isnan(view.keyed_iou)) v["keyed_iou"] = view.keyed_iou;
-    v["methods"] = methods_json(view.methods);
-    out["views"].push_back(std::move(v));
-  }
-  return out.dump(1);
 }
 
 Evaluation evaluate_capture(const Capture& capture, const EvaluateOptions& options, Job& job) {
@@ -159,6 +188,11 @@ Evaluation evaluate_capture(const Capture& capture, const EvaluateOptions& optio
   const fs::path folder = capture.folder() / "evaluate";
   if (options.pictures) fs::create_directories(folder);
 
+  Methods methods;
+  methods["mean_texture"] = [&](const View& v) { return render_texture(textured, scene, v, options.render, job); };
+  methods["lumigraph"] = [&](const View& v) { return lumigraph.render(v, options.render, job); };
+  if (light_field) methods["light_field"] = [&](const View& v) { return light_field->render(v, options.render, job); };
+
   const PhotoSet references = photos_of(capture, held_out);
   for (std::size_t i = 0; i < held_out.size(); ++i) {
     job.check();
@@ -172,19 +206,19 @@ Evaluation evaluate_capture(const Capture& capture, const EvaluateOptions& optio
       photo.alpha = std::move(mask);
     }
     const Image reference = composited(photo.rgb, photo.alpha, background);
-    const auto judge = [&](const std::string& method, const Rendering& rendering) {
+    for (const auto& [method, render] : methods) {
+      const Rendering rendering = render(references.views[i]);
+      // The hull's silhouette: of the mesh as it was carved.
+      if (method == "mean_texture") result.silhouette_iou = silhouette_iou(coverage_of(rendering.rgba), photo.alpha);
       const Image picture = composited(rendering.rgba, background);
       result.methods[method] = compare_pictures(picture, reference, photo.alpha);
       if (options.pictures) write_png(folder / (result.name + "." + method + ".png"), side_by_side(reference, picture));
-    };
-    const Rendering rendering = render_texture(textured, scene, references.views[i], options.render, job);
-    result.silhouette_iou = silhouette_iou(coverage_of(rendering.rgba), photo.alpha);
-    judge("mean_texture", rendering);
-    if (light_field) judge("light_field", light_field->render(references.views[i], options.render, job));
-    judge("lumigraph", lumigraph.render(references.views[i], options.render, job));
+    }
     evaluation.views.push_back(std::move(result));
   }
   evaluation.mean = mean_of(evaluation.views);
+  if (!options.test_views.empty())
+    evaluation.test_views = evaluate_test_views(options.test_views, methods, background, job);
   return evaluation;
 }
 

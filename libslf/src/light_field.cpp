@@ -1,4 +1,5 @@
 #include <lumihull/base/error.h>
+#include <lumihull/slf/camera_path.h>
 #include <lumihull/slf/light_field.h>
 
 #include <algorithm>
@@ -118,6 +119,7 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
 
   LightField field;
   field.base.mesh = mesh;
+  field.up = up_axis(photos.views).cast<float>();
   field.nodes = nodes_of(mesh, samples, std::size_t(options.max_nodes));
   field.adds_base = !non_negative || options.terms == 0;
 

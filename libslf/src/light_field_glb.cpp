@@ -93,6 +93,7 @@ std::string encode_light_field(const LightField& field, const LightFieldFileOpti
                                                       {"count", vertex_of.size()},
                                                       {"type", "SCALAR"}})},
                     {"addsBase", field.adds_base},
+                    {"up", {field.up.x(), field.up.y(), field.up.z()}},
                     {"nodes", buffer.add_vectors(field.nodes, false, 0)}};
   if (!field.slot.empty()) {
     std::vector<std::uint8_t> slots;
@@ -168,6 +169,9 @@ LightField read_light_field(const std::filesystem::path& path) {
   field.base.texture = std::move(split.texture);
 
   field.adds_base = extension.at("addsBase").boolean();
+  const JsonReader up = extension.at("up");
+  if (up.array_size(3) != 3) up.fail("three numbers");
+  for (std::size_t i = 0; i < 3; ++i) field.up[std::ptrdiff_t(i)] = float(up.at(i).number(-1.001, 1.001));
   field.nodes = file.vectors3(glb_index(extension.at("nodes")));
   if (field.nodes.size() > std::size_t(kMaxNodes)) extension.at("nodes").fail("at most 255 nodes");
   if (extension.has("slots")) {

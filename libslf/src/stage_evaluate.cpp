@@ -16,6 +16,10 @@ std::filesystem::path reference_folder(const Capture& capture) {
   return effective<std::string>(capture, "evaluate", "reference_masks");
 }
 
+std::filesystem::path test_folder(const Capture& capture) {
+  return effective<std::string>(capture, "evaluate", "test_views");
+}
+
 bool needed(const Capture& capture, std::string& why) {
   if (!held_out_shots(capture).empty()) return true;
   why = "no photograph is held out (--hold-out N)";
@@ -30,6 +34,8 @@ void inputs(const Capture& capture, InputDigest& digest) {
   digest.add_file("light field", light_field_path(capture));
   if (capture.background_rgb)
     digest.add("background", {reinterpret_cast<const char*>(capture.background_rgb->data()), 3});
+  if (const std::filesystem::path folder = test_folder(capture); !folder.empty())
+    for (const char* file : {"test_views.json", "test_highlights.json"}) digest.add_file(file, folder / file);
   const std::filesystem::path references = reference_folder(capture);
   if (references.empty()) return;
   for (const std::size_t i : held_out_shots(capture)) {
@@ -44,6 +50,7 @@ bool present(const Capture& capture) { return file_exists(evaluation_path(captur
 std::vector<std::string> run(Capture& capture, Job& job) {
   EvaluateOptions options;
   options.reference_masks = reference_folder(capture);
+  options.test_views = test_folder(capture);
   options.render.rays = int(effective<std::int64_t>(capture, "evaluate", "rays"));
   options.lumigraph.photographs = int(effective<std::int64_t>(capture, "evaluate", "photographs"));
   const Evaluation evaluation = evaluate_capture(capture, options, job);
@@ -63,6 +70,16 @@ std::vector<std::string> run(Capture& capture, Job& job) {
                   quality.psnr, quality.ssim, quality.psnr_inside, quality.ssim_inside);
     said.emplace_back(line);
   }
+  for (const auto& [method, quality] : evaluation.test_views.methods) {
+    std::snprintf(line, sizeof line, "%-13s test views: PSNR %.2f dB, inside %.2f dB", method.c_str(), quality.psnr,
+                  quality.psnr_inside);
+    said.emplace_back(line);
+  }
+  for (const auto& [method, path] : evaluation.test_views.highlights) {
+    std::snprintf(line, sizeof line, "%-13s highlight: in %zu of %zu views, along %.0f %% of its way, %.1f px off",
+                  method.c_str(), path.found, path.views, 100 * path.share, path.rms_px);
+    said.emplace_back(line);
+  }
   return said;
 }
 
@@ -80,6 +97,13 @@ const StageDefinition& evaluate_stage() {
       {
           {"reference_masks",
            "folder of masks to judge by, named like the photographs; empty: the capture's own",
+           std::string(),
+           0,
+           0,
+           {},
+           true},
+          {"test_views",
+           "folder of test views as the virtual rig's truth/ has (cameras, pictures, true highlights); empty: none",
            std::string(),
            0,
            0,

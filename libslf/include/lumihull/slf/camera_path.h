@@ -40,6 +40,9 @@ struct TurntableOptions {
 /// Errors: invalid_argument (options), degenerate (empty mesh).
 LUMIHULL_API std::vector<PathView> turntable(const hull::Mesh& mesh, std::span<const View> photographs,
                                              const TurntableOptions& options = {});
+/// The same about a given axis; the azimuth's origin is the direction of `first` from the middle of the object.
+LUMIHULL_API std::vector<PathView> turntable(const hull::Mesh& mesh, const Eigen::Vector3d& up,
+                                             const Eigen::Vector3d& first, const TurntableOptions& options = {});
 
 /// Reads cameras from a JSON file:
 ///

@@ -3,6 +3,7 @@
 #include <lumihull/base/api.h>
 #include <lumihull/base/capture.h>
 #include <lumihull/base/job.h>
+#include <lumihull/slf/highlights.h>
 #include <lumihull/slf/lumigraph.h>
 #include <lumihull/slf/metrics.h>
 
@@ -19,6 +20,10 @@ struct EvaluateOptions {
   std::filesystem::path reference_masks;  ///< folder of masks named like the shots; empty: the capture's own masks
   std::filesystem::path model;            ///< textured mesh; empty: textured.glb in the capture
   std::filesystem::path light_field;      ///< empty: light_field.glb in the capture, where there is one
+  /// Folder of views that are no photographs of the capture, as the virtual rig's truth/ has: test_views.json
+  /// (cameras), test_views/NAME.png, test_views/masks/NAME.png, and test_highlights.json where the object is glossy.
+  /// Empty: none.
+  std::filesystem::path test_views;
   RenderOptions render{3, false};
   LumigraphOptions lumigraph;
   bool pictures = true;  ///< write reference | rendering | difference to evaluate/ in the capture
@@ -34,6 +39,13 @@ struct ViewEvaluation {
   std::map<std::string, PictureQuality> methods;                ///< "light_field", "lumigraph", "mean_texture"
 };
 
+/// What pictures of views besides the photographs are like.
+struct TestViewEvaluation {
+  std::size_t views = 0;
+  std::map<std::string, PictureQuality> methods;    ///< means
+  std::map<std::string, HighlightPath> highlights;  ///< of the methods, and of "photograph": the measure's own limit
+};
+
 struct Evaluation {
   std::size_t photos_used = 0, photos_held_out = 0;
   std::size_t triangles = 0;
@@ -41,6 +53,7 @@ struct Evaluation {
   std::uint64_t light_field_bytes = 0;  ///< of light_field.glb; 0: there is none
   ViewEvaluation mean;
   std::vector<ViewEvaluation> views;
+  TestViewEvaluation test_views;
   std::map<std::string, StageRecord, std::less<>> stages;
 
   /// One JSON object: "photos_used", "photos_held_out", "silhouette_iou", "keyed_iou" (where reference masks were

@@ -1,0 +1,227 @@
+#include <lumihull/slf/light_field.h>
+#include <lumihull/slf/light_field_glb.h>
+#include <lumihull/slf/metrics.h>
+#include <lumihull/slf/textured_mesh.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "support.h"
+#include "synthetic.h"
+
+namespace lumihull {
+namespace {
+
+/// Colour of a place as an eye sees it.
+using ViewPaint = std::function<Eigen::Vector3f(const Eigen::Vector3f& place, const Eigen::Vector3f& eye)>;
+
+slf::PhotoSet photographs_of(const hull::Mesh& mesh, const ViewPaint& paint, const std::vector<View>& views) {
+  const auto kept = std::make_shared<std::vector<slf::Photo>>();
+  slf::PhotoSet photos;
+  for (const View& view : views) {
+    const Eigen::Vector3f eye = view.center().cast<float>();
+    kept->push_back(test::photograph(
+        mesh, [&](const Eigen::Vector3f& p) { return paint(p, eye); }, view));
+    photos.names.push_back("photo" + std::to_string(photos.names.size()));
+    photos.views.push_back(view);
+  }
+  photos.read = [kept](std::size_t i) { return kept->at(i); };
+  return photos;
+}
+
+/// A ball of bands with a broad white gloss from one lamp.
+ViewPaint glossy() {
+  return [bands = test::bands()](const Eigen::Vector3f& p, const Eigen::Vector3f& eye) -> Eigen::Vector3f {
+    const Eigen::Vector3f n = p.normalized(), v = (eye - p).normalized();
+    const Eigen::Vector3f mirrored = 2 * n.dot(v) * n - v;
+    const float c = std::max(0.0f, mirrored.dot(Eigen::Vector3f(1, 0.5f, 0.8f).normalized()));
+    return 0.7f * bands(p) + Eigen::Vector3f::Constant(70 * std::pow(c, 5.0f));
+  };
+}
+
+/// Factors of known rank: two patterns on the surface times two smooth functions of the eye's direction.
+ViewPaint rank_two() {
+  return [](const Eigen::Vector3f& p, const Eigen::Vector3f& eye) -> Eigen::Vector3f {
+    const Eigen::Vector3f d = eye.normalized();
+    const Eigen::Vector3f first(0.2f + 0.2f * p.x(), 0.1f, 0.2f * p.y()), second(0.05f, 0.1f * p.z(), 0.05f * p.x());
+    return 255 * (Eigen::Vector3f(0.5f, 0.45f, 0.4f) + 0.9f * d.x() * first + 0.9f * d.y() * second);
+  };
+}
+
+/// Pixels well inside of the object: at its rim photographs hold some green.
+Image inner(const Image& alpha) {
+  Image out(alpha.width(), alpha.height(), 1);
+  for (int y = 2; y + 2 < alpha.height(); ++y)
+    for (int x = 2; x + 2 < alpha.width(); ++x) {
+      int least = 255;
+      for (int j = -2; j <= 2; ++j)
+        for (int i = -2; i <= 2; ++i) least = std::min<int>(least, alpha.row<std::uint8_t>(y + j)[x + i]);
+      out.row<std::uint8_t>(y)[x] = least == 255 ? 255 : 0;
+    }
+  return out;
+}
+
+double mean_psnr(const slf::LightField& field, const slf::PhotoSet& photos, int terms = slf::kMaxTerms) {
+  const slf::LightFieldRenderer renderer(field, terms);
+  Job job;
+  double sum = 0;
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    const slf::Photo photo = photos.read(i);
+    const Image picture = slf::composited(renderer.render(photos.views[i], {.rays = 3}, job).rgba, {0, 0, 0});
+    const Image inside = inner(photo.alpha);
+    sum += slf::psnr(picture, slf::composited(photo.rgb, photo.alpha, {0, 0, 0}), &inside);
+  }
+  return sum / double(photos.size());
+}
+
+double mean_psnr(const slf::TexturedMesh& textured, const slf::PhotoSet& photos) {
+  const hull::RayScene scene(textured.mesh);
+  Job job;
+  double sum = 0;
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    const slf::Photo photo = photos.read(i);
+    const Image picture =
+        slf::composited(slf::render_texture(textured, scene, photos.views[i], {.rays = 3}, job).rgba, {0, 0, 0});
+    const Image inside = inner(photo.alpha);
+    sum += slf::psnr(picture, slf::composited(photo.rgb, photo.alpha, {0, 0, 0}), &inside);
+  }
+  return sum / double(photos.size());
+}
+
+std::vector<View> training_views() { return test::around(16, 5, 4, test::camera(120, 100, 110)); }
+
+/// Between the training views.
+std::vector<View> new_views() {
+  std::vector<View> views;
+  for (int i = 0; i < 7; ++i) {
+    const double a = 0.3 + 0.9 * i, z = 0.3 + 0.2 * (i % 3);
+    const Eigen::Vector3d eye = 4 * Eigen::Vector3d(std::cos(a), std::sin(a), z).normalized();
+    views.push_back({test::camera(120, 100, 110), look_at(eye, {0, 0, 0}, {0, 0, 1})});
+  }
+  return views;
+}
+
+TEST(LightField, ShowsGlossThatTheMeanColourCannot) {
+  const hull::Mesh mesh = test::sphere(40);
+  const slf::PhotoSet seen = photographs_of(mesh, glossy(), training_views());
+  const slf::PhotoSet fresh = photographs_of(mesh, glossy(), new_views());
+  Job job;
+  slf::LightFieldReport report;
+  const slf::LightField field =
+      slf::fit_light_field(mesh, seen, {.terms = 4, .edge_alpha = test::kNoTrace}, job, &report);
+  const slf::TexturedMesh mean = slf::mean_texture(mesh, seen, {.edge_alpha = test::kNoTrace}, job);
+  EXPECT_GT(mean_psnr(field, fresh), mean_psnr(mean, fresh) + 3);
+  EXPECT_GT(mean_psnr(field, seen), mean_psnr(mean, seen) + 6);
+  EXPECT_LT(report.rms, 0.5 * report.rms_of_mean);
+  EXPECT_LT(report.unseen_share, 0.2);
+}
+
+TEST(LightField, LosesNothingOnAMattObject) {
+  const hull::Mesh mesh = test::sphere(40);
+  const slf::PhotoSet seen = test::photographs(mesh, test::bands(), training_views());
+  const slf::PhotoSet fresh = test::photographs(mesh, test::bands(), new_views());
+  Job job;
+  const slf::LightField field = slf::fit_light_field(mesh, seen, {}, job);
+  // Beyond 50 dB it is the bytes' rounding that differs.
+  EXPECT_GT(mean_psnr(field, fresh), std::min(50.0, mean_psnr(slf::mean_texture(mesh, seen, {}, job), fresh) - 0.05));
+}
+
+TEST(LightField, RecoversFactorsOfKnownRankAndOrdersThemByEnergy) {
+  const hull::Mesh mesh = test::sphere(40);
+  const slf::PhotoSet seen = photographs_of(mesh, rank_two(), training_views());
+  const slf::PhotoSet fresh = photographs_of(mesh, rank_two(), new_views());
+  Job job;
+  const slf::LightField field = slf::fit_light_field(
+      mesh, seen, {.terms = 4, .surface_ridge = 1e-4, .view_smoothness = 1e-3, .edge_alpha = test::kNoTrace}, job);
+  const double none = mean_psnr(field, fresh, 0), one = mean_psnr(field, fresh, 1), two = mean_psnr(field, fresh, 2),
+               all = mean_psnr(field, fresh, 4);
+  EXPECT_GT(one, none + 4);
+  EXPECT_GT(two, one + 3);
+  EXPECT_LT(std::abs(all - two), 1.5);  // the others hold nothing
+  EXPECT_GT(two, 38);
+}
+
+TEST(LightField, IsTheSameForAnyNumberOfThreads) {
+  const hull::Mesh mesh = test::sphere(16);
+  const slf::PhotoSet seen = photographs_of(mesh, glossy(), test::around(6, 2, 4, test::camera(60, 50, 55)));
+  std::string bytes[2];
+  for (const unsigned threads : {1u, 3u}) {
+    Job job({}, threads);
+    bytes[threads > 1] = slf::encode_light_field(slf::fit_light_field(mesh, seen, {.terms = 3, .iterations = 3}, job));
+  }
+  EXPECT_TRUE(bytes[0] == bytes[1]);
+}
+
+TEST(LightField, PlacesThatNobodySawTakeTheColoursAroundThem) {
+  const hull::Mesh mesh = test::sphere(24);
+  std::vector<View> views;  // all from one side
+  for (int i = 0; i < 6; ++i) {
+    const Eigen::Vector3d eye(4, 0.5 * (i - 2.5), 0.3 * (i % 2));
+    views.push_back({test::camera(80, 70, 75), look_at(eye, {0, 0, 0}, {0, 0, 1})});
+  }
+  const slf::PhotoSet seen = test::photographs(mesh, test::plain(180, 90, 40), views);
+  Job job;
+  slf::LightFieldReport report;
+  const slf::LightField field =
+      slf::fit_light_field(mesh, seen, {.terms = 2, .edge_alpha = test::kNoTrace}, job, &report);
+  EXPECT_GT(report.unseen_share, 0.3);
+  const View behind{test::camera(80, 70, 75), look_at({-4, 0, 0}, {0, 0, 0}, {0, 0, 1})};
+  EXPECT_LE(test::largest_difference(slf::LightFieldRenderer(field).render(behind, {}, job).rgba, {180, 90, 40}), 1);
+}
+
+TEST(LightField, StandsDegenerateTrianglesAndUnusedVertices) {
+  hull::Mesh mesh = test::sphere(16);
+  const auto n = std::uint32_t(mesh.vertices.size());
+  mesh.vertices.push_back({5, 5, 5});  // nobody uses it
+  mesh.vertices.push_back(mesh.vertices[0]);
+  mesh.triangles.push_back({0, 0, 1});
+  mesh.triangles.push_back({0, n + 1, 1});  // two vertices at one place
+  mesh.triangles.push_back({2, 2, 2});
+  const slf::PhotoSet seen =
+      test::photographs(test::sphere(16), test::plain(60, 160, 200), test::around(6, 2, 4, test::camera(60, 50, 55)));
+  Job job;
+  const slf::LightField field = slf::fit_light_field(mesh, seen, {.terms = 2, .edge_alpha = test::kNoTrace}, job);
+  const Image rgba = slf::LightFieldRenderer(field).render(seen.views[0], {}, job).rgba;
+  EXPECT_LE(test::largest_difference(rgba, {60, 160, 200}), 1);
+  EXPECT_NO_THROW(slf::encode_light_field(field));
+}
+
+TEST(LightField, ChoosesNodesAmongManyPhotographs) {
+  const hull::Mesh mesh = test::sphere(16);
+  const slf::PhotoSet seen = photographs_of(mesh, glossy(), test::around(12, 3, 4, test::camera(60, 50, 55)));
+  Job job;
+  const slf::LightField field = slf::fit_light_field(mesh, seen, {.terms = 3, .max_nodes = 12}, job);
+  EXPECT_EQ(field.nodes.size(), 12u);
+  const slf::LightField all = slf::fit_light_field(mesh, seen, {.terms = 3}, job);
+  EXPECT_EQ(all.nodes.size(), 36u);
+  EXPECT_GT(mean_psnr(all, seen), mean_psnr(field, seen));
+  EXPECT_GT(mean_psnr(field, seen), mean_psnr(field, seen, 0) + 1);
+}
+
+TEST(LightField, SaysWhatItNeeds) {
+  const hull::Mesh mesh = test::sphere(8);
+  const auto views = test::around(4, 1, 4, test::camera(40, 40, 40));
+  const slf::PhotoSet two = test::photographs(mesh, test::plain(9, 9, 9), {views[0], views[1]});
+  const slf::PhotoSet four = test::photographs(mesh, test::plain(9, 9, 9), views);
+  Job job;
+  const Error few = test::expect_error([&] { slf::fit_light_field(mesh, two, {}, job); });
+  EXPECT_EQ(few.code(), ErrorCode::degenerate);
+  EXPECT_THAT(few.message(), testing::HasSubstr("at least three photographs, not 2"));
+  EXPECT_EQ(test::expect_error([&] { slf::fit_light_field({}, four, {}, job); }).code(), ErrorCode::degenerate);
+  hull::Mesh bad = mesh;
+  bad.triangles[3][1] = 1u << 30;
+  EXPECT_EQ(test::expect_error([&] { slf::fit_light_field(bad, four, {}, job); }).code(), ErrorCode::bad_input);
+  for (const slf::LightFieldOptions& o :
+       {slf::LightFieldOptions{.terms = 13}, slf::LightFieldOptions{.terms = -1},
+        slf::LightFieldOptions{.max_nodes = 256}, slf::LightFieldOptions{.texel_px = NAN},
+        slf::LightFieldOptions{.iterations = 0}, slf::LightFieldOptions{.surface_ridge = -1}})
+    EXPECT_EQ(test::expect_error([&] { slf::fit_light_field(mesh, four, o, job); }).code(),
+              ErrorCode::invalid_argument);
+  Job cancelled;
+  cancelled.cancel();
+  EXPECT_EQ(test::expect_error([&] { slf::fit_light_field(mesh, four, {}, cancelled); }).code(), ErrorCode::cancelled);
+}
+
+}  // namespace
+}  // namespace lumihull
