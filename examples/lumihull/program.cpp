@@ -122,6 +122,7 @@ int Program::run(int argc, char** argv) {
   add_import(*this);
   add_key(*this);
   add_hull(*this);
+  add_texture(*this);
   add_lightfield(*this);
   add_render(*this);
   add_evaluate(*this);

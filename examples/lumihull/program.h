@@ -80,6 +80,7 @@ void add_import(Program& program);
 void add_export(Program& program);
 void add_key(Program& program);
 void add_hull(Program& program);
+void add_texture(Program& program);
 void add_lightfield(Program& program);
 void add_render(Program& program);
 void add_evaluate(Program& program);

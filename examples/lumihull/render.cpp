@@ -1,4 +1,4 @@
-// lumihull render CAPTURE: new views.
+// lumihull render CAPTURE|MODEL.glb: new views.
 
 #include <lumihull/base/error.h>
 #include <lumihull/slf/camera_path.h>
@@ -16,10 +16,10 @@ namespace lumihull::program {
 namespace {
 
 struct Arguments {
-  std::string folder, output, cameras, method = "light_field", background = "transparent";
+  std::string source, output, cameras, method, background = "transparent";
   slf::TurntableOptions turntable;
   int rays = 2;
-  bool held_out = false, overwrite = false;
+  bool held_out = false, adaptive = false, overwrite = false;
 };
 
 /// "r,g,b" as a colour; nullopt for "transparent".
@@ -34,19 +34,22 @@ std::optional<std::array<std::uint8_t, 3>> parse_background(const std::string& t
   return std::array{std::uint8_t(rgb[0]), std::uint8_t(rgb[1]), std::uint8_t(rgb[2])};
 }
 
-std::vector<slf::PathView> path_of(const Arguments& a, const Capture& capture, const slf::CaptureRenderer& renderer) {
-  if (a.held_out) return slf::views_of_shots(capture, slf::held_out_shots(capture));
+/// A model's file, not a capture's folder.
+bool is_model(const std::filesystem::path& source) {
+  std::error_code ignored;
+  return !std::filesystem::is_directory(source, ignored) &&
+         (source.extension() == ".glb" || std::filesystem::exists(source, ignored));
+}
+
+std::vector<slf::PathView> path_of(const Arguments& a, const slf::CaptureRenderer& renderer) {
   if (!a.cameras.empty()) return slf::read_camera_path(a.cameras);
   return renderer.turntable(a.turntable);
 }
 
-void render(Program& program, const Arguments& a) {
-  const Capture capture = Capture::open(a.folder);
+/// Writes the pictures along a path.
+void draw(Program& program, const Arguments& a, slf::CaptureRenderer& renderer, const std::vector<slf::PathView>& path,
+          const std::filesystem::path& output) {
   const auto background = parse_background(a.background);
-  const std::filesystem::path output = a.output.empty() ? capture.folder() / "render" : std::filesystem::path(a.output);
-  slf::CaptureRenderer renderer(capture, a.method);
-  const std::vector<slf::PathView> path = path_of(a, capture, renderer);
-  if (path.empty()) throw Error(ErrorCode::not_found, "no photograph is held out", capture.folder().string());
   std::filesystem::create_directories(output);
   if (!a.overwrite)
     for (const slf::PathView& p : path)
@@ -54,7 +57,7 @@ void render(Program& program, const Arguments& a) {
         throw Error(ErrorCode::invalid_argument, "the file exists; name another folder, or --overwrite",
                     (output / (p.name + ".png")).string());
 
-  const slf::RenderOptions options{.rays = a.rays};
+  const slf::RenderOptions options{.rays = a.rays, .adaptive = a.adaptive};
   Job& job = program.job();
   Job frame_job({}, job.threads());  // a frame's own progress would hide that of the sequence
   job.begin("rendering", path.size());
@@ -71,18 +74,41 @@ void render(Program& program, const Arguments& a) {
     std::cout << "{\"output\": " << json_text(output.string()) << ", \"pictures\": " << path.size() << "}\n";
 }
 
+/// Renders a model's file alone, which has no photographs.
+void render_model(Program& program, const Arguments& a) {
+  const auto refuse = [](const char* flag, const char* what) { throw Error(ErrorCode::invalid_argument, what, flag); };
+  if (a.held_out) refuse("--held-out", "a model's file has no photographs; name the capture's folder");
+  if (!a.method.empty()) refuse("--method", "a model's file is shown as what it is; name the capture's folder");
+  if (a.output.empty()) refuse("--output", "expected a folder for the pictures of a model's file");
+  slf::CaptureRenderer renderer{std::filesystem::path(a.source)};
+  draw(program, a, renderer, path_of(a, renderer), a.output);
+}
+
+void render_capture(Program& program, const Arguments& a) {
+  const Capture capture = Capture::open(a.source);
+  std::error_code ignored;
+  const bool has_light_field = std::filesystem::exists(capture.folder() / "light_field.glb", ignored);
+  slf::CaptureRenderer renderer(capture, !a.method.empty() ? a.method : has_light_field ? "light_field" : "lumigraph");
+  const auto path = a.held_out ? slf::views_of_shots(capture, slf::held_out_shots(capture)) : path_of(a, renderer);
+  if (path.empty()) throw Error(ErrorCode::not_found, "no photograph is held out", capture.folder().string());
+  draw(program, a, renderer, path, a.output.empty() ? capture.folder() / "render" : std::filesystem::path(a.output));
+}
+
 }  // namespace
 
 void add_render(Program& program) {
   const auto a = std::make_shared<Arguments>();
-  CLI::App* verb =
-      program.verb("render", "new views: PNG pictures along a path", [&program, a] { render(program, *a); });
-  verb->add_option("capture", a->folder, "folder of the capture")->required();
-  verb->add_option("-o,--output", a->output, "folder for the pictures [CAPTURE/render]");
+  CLI::App* verb = program.verb("render", "new views: PNG pictures along a path", [&program, a] {
+    is_model(a->source) ? render_model(program, *a) : render_capture(program, *a);
+  });
+  verb->add_option("source", a->source, "folder of the capture, or a model's file (.glb) alone")
+      ->required()
+      ->type_name("CAPTURE|MODEL.glb");
+  verb->add_option("-o,--output", a->output, "folder for the pictures; needed with MODEL.glb [CAPTURE/render]");
   verb->add_option(
           "--method", a->method,
           "light_field (the factored model), lumigraph (blends photographs), mean_texture or shaded (bare hull) "
-          "[light_field]")
+          "[light_field where light_field.glb exists, else lumigraph]")
       ->check(CLI::IsMember({"light_field", "lumigraph", "mean_texture", "shaded"}));
   auto* turntable = verb->add_option("--turntable", a->turntable.frames, "so many frames around the object [60]")
                         ->check(CLI::Range(1, 100000));
@@ -96,6 +122,7 @@ void add_render(Program& program) {
   verb->add_option("--width", a->turntable.width, "of the turntable's pictures, px [1280]");
   verb->add_option("--height", a->turntable.height, "px [720]");
   verb->add_option("--rays", a->rays, "n x n rays a pixel [2]")->check(CLI::Range(1, 8));
+  verb->add_flag("--adaptive", a->adaptive, "n x n rays only at outlines: faster");
   verb->add_option("--background", a->background, "transparent, or r,g,b [transparent]");
   verb->add_flag("--overwrite", a->overwrite, "replace pictures of the same names");
 }

@@ -20,6 +20,10 @@ constexpr int kVersion = 1;
 constexpr int kUnsignedShort = 5123, kUnsignedInt = 5125;
 constexpr std::uint64_t kMostViewBytes = std::uint64_t(1) << 31;
 
+bool has_extension(const JsonReader& primitive) {
+  return primitive.has("extensions") && primitive.at("extensions").has(kExtension);
+}
+
 /// zlib format (RFC 1950), which browsers can inflate themselves.
 std::string deflated(const std::vector<std::uint8_t>& bytes) {
   const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
@@ -134,10 +138,12 @@ std::uint64_t write_light_field(const std::filesystem::path& file, const LightFi
   return bytes.size();
 }
 
+bool has_light_field(const std::filesystem::path& path) { return has_extension(GlbFile(path).primitive()); }
+
 LightField read_light_field(const std::filesystem::path& path) {
   const GlbFile file(path);
   const JsonReader primitive = file.primitive();
-  if (!primitive.has("extensions") || !primitive.at("extensions").has(kExtension))
+  if (!has_extension(primitive))
     throw Error(ErrorCode::bad_input, std::string("the model has no light field: expected the extension ") + kExtension,
                 file.name());
   const JsonReader extension = primitive.at("extensions").at(kExtension);

@@ -28,4 +28,8 @@ LUMIHULL_API std::uint64_t write_light_field(const std::filesystem::path& file, 
 /// (what is wrong and where; a model without light field), unsupported (another version).
 LUMIHULL_API LightField read_light_field(const std::filesystem::path& file);
 
+/// Whether a model's file has a light field, of whatever version. Errors: not_found, io, bad_input (no glTF binary),
+/// unsupported.
+LUMIHULL_API bool has_light_field(const std::filesystem::path& file);
+
 }  // namespace lumihull::slf
