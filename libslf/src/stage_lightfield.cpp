@@ -34,6 +34,10 @@ std::vector<std::string> run(Capture& capture, Job& job) {
     mesh = hull::simplify(mesh, {std::size_t(triangles), 0}, job).mesh;
 
   LightFieldOptions options;
+  const auto factorization = effective<std::string>(capture, "lightfield", "factorization");
+  options.method = factorization == "pca"   ? Factorization::pca
+                   : factorization == "nmf" ? Factorization::nmf
+                                            : Factorization::joint;
   options.terms = integer("terms");
   options.max_nodes = integer("nodes");
   options.max_side = integer("map_side");
@@ -69,6 +73,12 @@ const StageDefinition& lightfield_stage() {
       "lightfield",
       1,
       {
+          {"factorization",
+           "joint (all vertices together), pca or nmf (each vertex's ring of triangles by itself)",
+           std::string("joint"),
+           0,
+           0,
+           {"joint", "pca", "nmf"}},
           {"terms", "products beyond the mean colour", std::int64_t(defaults.terms), 0, kMaxTerms},
           {"triangles", "simplify the hull to at most so many; 0: as it is", kTriangles, 0, 1e9},
           {"map_px", "size of a texel of the surface maps in pixels of the photographs", defaults.texel_px, 0.1, 100},
