@@ -522,14 +522,18 @@ LH_API lh_status lh_capture_export_nerf(lh_context *ctx, const lh_capture *captu
 
 /* ---- new views --------------------------------------------------------------------------------------------------- */
 
-/** Renders new views of a capture that has a hull. Photographs are read when first needed and kept for the next view.
- */
+/** Renders new views of a capture that has a hull, or of a model's file. Photographs are read when first needed and kept
+ *  for the next view. */
 typedef struct lh_renderer lh_renderer;
 
-/** method: "lumigraph" blends photographs on the hull; "mean_texture" shows the model in textured.glb; "shaded" the
- * bare hull in grey. What it needs of the capture is copied. @return LH_ENOTFOUND: the stage that makes it has not been
- * run */
+/** method: "light_field" shows the factored model in light_field.glb; "lumigraph" blends photographs on the hull;
+ *  "mean_texture" shows the model in textured.glb; "shaded" the bare hull in grey. What it needs of the capture is
+ *  copied. @return LH_ENOTFOUND: the stage that makes it has not been run */
 LH_API lh_status lh_renderer_create(lh_context *ctx, const lh_capture *capture, const char *method, lh_renderer **out);
+/** A model by its file alone, no capture: a light_field.glb as its light field, any other .glb of Lumihull's as its
+ *  texture. A turntable's up and first frame are then what the light field knows of its photographs, else z and x.
+ *  @return LH_ENOTFOUND; LH_EINPUT: no such model; LH_EUNSUPPORTED: another version, or a glTF file of another kind */
+LH_API lh_status lh_renderer_open(lh_context *ctx, const char *file, lh_renderer **out);
 LH_API void lh_renderer_destroy(lh_renderer *renderer);
 
 /**

@@ -1,5 +1,6 @@
 #include <lumihull/slf/capture_renderer.h>
 
+#include <filesystem>
 #include <numbers>
 
 #include "arguments.h"
@@ -17,6 +18,13 @@ lh_status lh_renderer_create(lh_context* ctx, const lh_capture* capture, const c
   return guarded(ctx, [&] {
     given(out, "out");
     *out = new lh_renderer{{given(capture, "capture").value, text(method, "method")}};
+  });
+}
+
+lh_status lh_renderer_open(lh_context* ctx, const char* file, lh_renderer** out) {
+  return guarded(ctx, [&] {
+    given(out, "out");
+    *out = new lh_renderer{slf::CaptureRenderer{std::filesystem::path(path(file, "file"))}};
   });
 }
 

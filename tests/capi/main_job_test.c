@@ -168,6 +168,54 @@ static void render(lh_context *ctx, const lh_capture *capture, const char *metho
   free(depth);
 }
 
+/* A turntable's second frame, 96 x 72. */
+static void second_frame(lh_context *ctx, lh_renderer *renderer, const lh_camera *camera, const double *pose,
+                         uint8_t rgba[96 * 72 * 4]) {
+  size_t i, hit = 0;
+  MUST(ctx, lh_renderer_render(ctx, renderer, camera, pose, 2, rgba, 96 * 72 * 4, NULL));
+  for (i = 0; i < 96 * 72; ++i) hit += rgba[4 * i + 3] > 0;
+  CHECK(hit > 96 * 72 / 50);
+}
+
+/* A model's file shows what the capture shows by `method`; with_up: it knows which way is up, too. */
+static void render_alone(lh_context *ctx, const lh_capture *capture, const char *method, const char *file, int with_up) {
+  static uint8_t of_capture[96 * 72 * 4], alone[96 * 72 * 4];
+  lh_renderer *a = NULL, *b = NULL;
+  lh_camera camera;
+  double poses[2 * 12], again[2 * 12];
+  int i;
+  memset(&camera, 0, sizeof camera);
+  camera.struct_size = sizeof camera;
+  MUST(ctx, lh_renderer_create(ctx, capture, method, &a));
+  MUST(ctx, lh_renderer_open(ctx, file, &b));
+  MUST(ctx, lh_renderer_turntable(ctx, a, 2, 96, 72, 0.3, &camera, poses));
+  second_frame(ctx, a, &camera, poses + 12, of_capture);
+  second_frame(ctx, b, &camera, poses + 12, alone);
+  CHECK(memcmp(of_capture, alone, sizeof alone) == 0);
+  MUST(ctx, lh_renderer_turntable(ctx, b, 2, 96, 72, 0.3, &camera, again));
+  second_frame(ctx, b, &camera, again + 12, alone);
+  if (with_up)
+    for (i = 0; i < 24; ++i) CHECK(fabs(poses[i] - again[i]) < 1e-4);
+  lh_renderer_destroy(a);
+  lh_renderer_destroy(b);
+}
+
+/* Files that are no models. */
+static void open_wrong_files(lh_context *ctx) {
+  lh_renderer *renderer = NULL;
+  const char *words = in(scratch, "words.glb");
+  FILE *file = fopen(words, "wb");
+  if (!file || fputs("these are no triangles, but they are long enough", file) < 0 || fclose(file)) exit(1);
+  EXPECT(ctx, LH_EINPUT, lh_renderer_open(ctx, words, &renderer));
+  CHECK_SAYS(ctx, "words.glb");
+  EXPECT(ctx, LH_ENOTFOUND, lh_renderer_open(ctx, in(scratch, "nowhere.glb"), &renderer));
+  CHECK_SAYS(ctx, "nowhere.glb");
+  EXPECT(ctx, LH_EINVAL, lh_renderer_open(ctx, NULL, &renderer));
+  EXPECT(ctx, LH_EINVAL, lh_renderer_open(ctx, "", &renderer));
+  EXPECT(ctx, LH_EINVAL, lh_renderer_open(ctx, words, NULL));
+  CHECK(renderer == NULL);
+}
+
 int main(int argc, char **argv) {
   lh_context *ctx = lh_context_create();
   lh_capture *capture = NULL, *copy = NULL;
@@ -218,6 +266,17 @@ int main(int argc, char **argv) {
   render(ctx, capture, "lumigraph");
   render(ctx, capture, "mean_texture");
   render(ctx, capture, "shaded");
+
+  /* The light field, in its own stage, and from its file alone. */
+  EXPECT(ctx, LH_EINVAL, lh_capture_set_option(ctx, capture, "lightfield", "factorization", "svd"));
+  MUST(ctx, lh_capture_set_option(ctx, capture, "lightfield", "terms", "3"));
+  memset(&said, 0, sizeof said);
+  MUST(ctx, lh_capture_run_stage(ctx, capture, "lightfield", 0, on_stage, &said));
+  CHECK(strcmp(said.names, "lightfield ") == 0);
+  render(ctx, capture, "light_field");
+  render_alone(ctx, capture, "light_field", in(scratch, "job/light_field.glb"), 1);
+  render_alone(ctx, capture, "mean_texture", in(scratch, "job/textured.glb"), 0);
+  open_wrong_files(ctx);
 
   json = text_of(ctx, capture, lh_capture_evaluation);
   CHECK(number_in(json, "photos_held_out") == 4);
