@@ -1,6 +1,7 @@
 """The main job: a capture from photographs to judged new views."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +35,7 @@ def test_stages_are_skipped_when_nothing_changed(own_copy: lumihull.Capture) -> 
     assert not again.skipped and again.seconds > 0 and again.peak_bytes > 0 and again.lines
 
 
-@pytest.mark.parametrize("method", ["lumigraph", "mean_texture", "shaded"])
+@pytest.mark.parametrize("method", ["light_field", "lumigraph", "mean_texture", "shaded"])
 def test_rendering(finished: lumihull.Capture, method: str) -> None:
     renderer = lumihull.Renderer(finished, method)  # type: ignore[arg-type]
     view = finished.view(0)
@@ -51,6 +52,37 @@ def test_rendering(finished: lumihull.Capture, method: str) -> None:
     around = renderer.turntable(3, 64, 48, elevation=0.3)
     assert len(around) == 3 and around[1].camera.width == 64
     assert (renderer.render(around[1], rays=1).rgba[:, :, 3] > 0).mean() > 0.02
+
+
+def test_a_model_by_its_file_alone(finished: lumihull.Capture, tmp_path: Path) -> None:
+    view = finished.view(0)
+    for method, file in (("light_field", "light_field.glb"), ("mean_texture", "textured.glb")):
+        expected = lumihull.Renderer(finished, method)  # type: ignore[arg-type]
+        shutil.copy(finished.folder / file, tmp_path / "model.glb")
+        renderer = lumihull.Renderer.open(tmp_path / "model.glb")
+        assert np.array_equal(renderer.render(view, rays=2).rgba, expected.render(view, rays=2).rgba)
+        assert len(renderer.turntable(2, 64, 48)) == 2
+    # The light field knows its photographs' up; the texture alone does not.
+    around, alone = (
+        lumihull.Renderer(finished, "light_field").turntable(3, 64, 48)[1],
+        lumihull.Renderer.open(finished.folder / "light_field.glb").turntable(3, 64, 48)[1],
+    )
+    assert np.allclose(around.cam_from_world.matrix, alone.cam_from_world.matrix, atol=1e-4)
+    (tmp_path / "words.glb").write_text("these are no triangles, but they are long enough")
+    for name, code in (("nowhere.glb", "not_found"), ("words.glb", "bad_input")):
+        with pytest.raises(lumihull.Error) as caught:
+            lumihull.Renderer.open(tmp_path / name)
+        assert caught.value.code == code and name in caught.value.subject
+
+
+def test_adaptive_rays_change_no_outline(finished: lumihull.Capture) -> None:
+    renderer = lumihull.Renderer(finished, "light_field")
+    view = finished.view(0)
+    everywhere = renderer.render(view, rays=4).rgba
+    adaptive = renderer.render(view, rays=4, adaptive=True).rgba
+    assert np.array_equal(adaptive[:, :, 3], everywhere[:, :, 3])
+    assert not np.array_equal(adaptive, everywhere)
+    assert lumihull.psnr(np.ascontiguousarray(adaptive[:, :, :3]), np.ascontiguousarray(everywhere[:, :, :3])) > 35
 
 
 def test_options(own_copy: lumihull.Capture) -> None:

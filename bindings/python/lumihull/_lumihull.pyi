@@ -313,10 +313,19 @@ class Rendering:
 
 class Renderer:
     def __init__(
-        self, capture: Capture, method: Literal["lumigraph", "mean_texture", "shaded"] = "lumigraph"
+        self, capture: Capture, method: Literal["light_field", "lumigraph", "mean_texture", "shaded"] = "lumigraph"
     ) -> None: ...
+    @staticmethod
+    def open(file: _Path) -> Renderer: ...
     def render(
-        self, view: View, *, rays: int = 2, depth: bool = False, progress: _OnProgress = None, threads: int = 0
+        self,
+        view: View,
+        *,
+        rays: int = 2,
+        depth: bool = False,
+        adaptive: bool = False,
+        progress: _OnProgress = None,
+        threads: int = 0,
     ) -> Rendering: ...
     def turntable(self, frames: int, width: int, height: int, *, elevation: float = 0.35) -> list[View]: ...
 

@@ -1,7 +1,9 @@
 #include <lumihull/slf/capture_renderer.h>
 #include <lumihull/slf/metrics.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
+#include <filesystem>
 #include <memory>
 #include <numbers>
 
@@ -19,13 +21,12 @@ struct RenderedView {
   py::object depth;
 };
 
-RenderedView render(slf::CaptureRenderer& self, const View& view, int rays, bool depth, const py::object& progress,
-                    unsigned threads) {
+RenderedView render(slf::CaptureRenderer& self, const View& view, const slf::RenderOptions& options,
+                    const py::object& progress, unsigned threads) {
   view.camera.validate();
-  slf::Rendering rendering =
-      work(progress, threads, [&](Job& job) { return self.render(view, {.rays = rays, .depth = depth}, job); });
+  slf::Rendering rendering = work(progress, threads, [&](Job& job) { return self.render(view, options, job); });
   RenderedView out{own_pixels(std::move(rendering.rgba)), py::none()};
-  if (depth) out.depth = own_pixels(std::move(rendering.depth));
+  if (options.depth) out.depth = own_pixels(std::move(rendering.depth));
   return out;
 }
 
@@ -51,18 +52,29 @@ void bind_views(py::module_& module) {
   py::class_<RenderedView>(module, "Rendering", "A new view.")
       .def_readonly("rgba", &RenderedView::rgba, "(height, width, 4) uint8, sRGB, straight alpha.")
       .def_readonly("depth", &RenderedView::depth, "(height, width) float32, infinite where nothing is; or None.");
-  py::class_<slf::CaptureRenderer>(module, "Renderer", "Renders new views of a capture that has a hull.")
+  py::class_<slf::CaptureRenderer>(module, "Renderer",
+                                   "Renders new views of a capture that has a hull, or of a model's file.")
       .def(py::init([](const Capture& capture, const std::string& method) {
              const InUse in_use(&capture, false);
              py::gil_scoped_release without_gil;
              return std::make_unique<slf::CaptureRenderer>(capture, method);
            }),
-           "capture"_a, "method"_a = "lumigraph", "method: \"lumigraph\", \"mean_texture\" or \"shaded\".")
+           "capture"_a, "method"_a = "lumigraph",
+           "method: \"light_field\", \"lumigraph\", \"mean_texture\" or \"shaded\".")
+      .def_static(
+          "open",
+          [](const std::filesystem::path& file) {
+            py::gil_scoped_release without_gil;
+            return std::make_unique<slf::CaptureRenderer>(file);
+          },
+          "file"_a, "A model by its file alone: a light_field.glb, or another .glb of Lumihull's by its texture.")
       .def("render",
-           guarded([](slf::CaptureRenderer& self, const View& view, int rays, bool depth, const py::object& progress,
-                      unsigned threads) { return render(self, view, rays, depth, progress, threads); }),
-           "view"_a, py::kw_only(), "rays"_a = 2, "depth"_a = false, "progress"_a = py::none(), "threads"_a = 0,
-           "Renders with rays x rays rays a pixel.")
+           guarded([](slf::CaptureRenderer& self, const View& view, int rays, bool depth, bool adaptive,
+                      const py::object& progress, unsigned threads) {
+             return render(self, view, {.rays = rays, .depth = depth, .adaptive = adaptive}, progress, threads);
+           }),
+           "view"_a, py::kw_only(), "rays"_a = 2, "depth"_a = false, "adaptive"_a = false, "progress"_a = py::none(),
+           "threads"_a = 0, "Renders with rays x rays rays a pixel; adaptive: only at outlines, which is faster.")
       .def("turntable",
            guarded([](const slf::CaptureRenderer& self, int frames, int width, int height, double elevation) {
              std::vector<View> views;
