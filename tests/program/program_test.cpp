@@ -6,6 +6,7 @@
 #include <lumihull/hull/ray_scene.h>
 #include <lumihull/rig/rig_capture.h>
 #include <lumihull/slf/camera_path.h>
+#include <lumihull/slf/light_field_glb.h>
 #include <signal.h>
 
 #include <fstream>
@@ -118,6 +119,68 @@ TEST_F(ProgramTest, RunsFromPhotographsToTheReport) {
   }
 }
 
+TEST_F(ProgramTest, AModelIsRenderedByItsFileAlone) {
+  ASSERT_EQ(lumihull({"import", "masks", capture_ / "truth" / "masks", "--into", capture()}).status, 0);
+  ASSERT_EQ(lumihull({"hull", capture(), "-q", "--resolution", "48"}).status, 0);
+  const auto small = [&](const std::string& source, const fs::path& output, std::vector<std::string> more = {}) {
+    std::vector<std::string> command{"render",   source, "--turntable", "2",    "--width", "120",
+                                     "--height", "80",   "-o",          output, "-q"};
+    command.insert(command.end(), more.begin(), more.end());
+    return lumihull(command);
+  };
+  const auto second = [](const fs::path& folder) { return read_file(folder / "frame_0001.png"); };
+
+  // Without a light field photographs are blended.
+  ASSERT_EQ(small(capture(), mine_ / "default").status, 0);
+  ASSERT_EQ(small(capture(), mine_ / "lumigraph", {"--method", "lumigraph"}).status, 0);
+  EXPECT_EQ(second(mine_ / "default"), second(mine_ / "lumigraph"));
+
+  const Outcome texture = lumihull({"texture", capture(), "-q", "--json"});
+  ASSERT_EQ(texture.status, 0) << texture.err;
+  EXPECT_FALSE(nlohmann::json::parse(texture.out)["stages"]["texture"]["skipped"]);
+  const Outcome lightfield = lumihull({"lightfield", capture(), "-q", "--terms", "3", "--triangles", "2000", "--json"});
+  ASSERT_EQ(lightfield.status, 0) << lightfield.err;
+  EXPECT_FALSE(nlohmann::json::parse(lightfield.out)["stages"]["lightfield"]["skipped"]);
+  EXPECT_EQ(Capture::open(capture_).option("lightfield", "terms", std::int64_t(0)), 3);
+
+  // With one it is the default, and its file alone shows the same.
+  ASSERT_EQ(small(capture(), mine_ / "field").status, 0);
+  EXPECT_NE(second(mine_ / "field"), second(mine_ / "lumigraph"));
+  const slf::PathView view{"same", Capture::open(capture_).view(3)};
+  slf::write_camera_path(mine_ / "cameras.json", {&view, 1});
+  const auto same = [&](const std::string& source, const std::string& output) {
+    EXPECT_EQ(lumihull({"render", source, "--cameras", mine_ / "cameras.json", "-o", mine_ / output}).status, 0);
+    return read_file(mine_ / output / "same.png");
+  };
+  const std::string by_capture = same(capture(), "by_capture");
+  fs::rename(capture_ / "light_field.glb", mine_ / "light_field.glb");
+  fs::rename(capture_ / "textured.glb", mine_ / "textured.glb");
+  ASSERT_EQ(small(mine_ / "light_field.glb", mine_ / "alone").status, 0);
+  EXPECT_EQ(same(mine_ / "light_field.glb", "by_file"), by_capture);
+  ASSERT_EQ(small(mine_ / "textured.glb", mine_ / "plain").status, 0);
+  ASSERT_EQ(small(mine_ / "light_field.glb", mine_ / "everywhere", {"--rays", "4"}).status, 0);
+  ASSERT_EQ(small(mine_ / "light_field.glb", mine_ / "adaptive", {"--rays", "4", "--adaptive"}).status, 0);
+  EXPECT_NE(second(mine_ / "adaptive"), second(mine_ / "everywhere"));
+
+  // Factored ring by ring, vertices have surface maps of their own.
+  EXPECT_TRUE(slf::read_light_field(mine_ / "light_field.glb").slot.empty());
+  ASSERT_EQ(lumihull({"lightfield", capture(), "-q", "--factorization", "pca"}).status, 0);
+  EXPECT_FALSE(slf::read_light_field(capture_ / "light_field.glb").slot.empty());
+
+  const auto refused = [&](std::vector<std::string> arguments, const std::string& names) {
+    arguments.insert(arguments.begin(), {"render", mine_ / "light_field.glb"});
+    const Outcome outcome = lumihull(arguments);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, HasSubstr(names));
+  };
+  refused({}, "--output");
+  refused({"--held-out", "-o", mine_ / "no"}, "--held-out");
+  refused({"--method", "shaded", "-o", mine_ / "no"}, "--method");
+  expect_failure(lumihull({"render", mine_ / "nowhere.glb", "-o", mine_ / "no"}), "nowhere.glb");
+  expect_failure(lumihull({"render", first_photo(), "-o", mine_ / "no"}), first_photo().filename());
+  EXPECT_FALSE(fs::exists(mine_ / "no"));
+}
+
 TEST_F(ProgramTest, WrongUseIsStatusTwo) {
   EXPECT_EQ(lumihull({}).status, 2);
   EXPECT_EQ(lumihull({"dance"}).status, 2);
@@ -131,6 +194,15 @@ TEST_F(ProgramTest, WrongUseIsStatusTwo) {
   const Outcome help = lumihull({"hull", "--help"});
   EXPECT_EQ(help.status, 0);
   EXPECT_THAT(help.out, HasSubstr("--resolution"));
+  for (const auto& [verb, flag] : {std::pair{"texture", "--texel-px"},
+                                   {"lightfield", "--factorization"},
+                                   {"render", "--adaptive"},
+                                   {"render", "light_field.glb exists"}}) {
+    const Outcome outcome = lumihull({verb, "--help"});
+    EXPECT_EQ(outcome.status, 0) << verb;
+    EXPECT_THAT(outcome.out, HasSubstr(flag)) << verb;
+  }
+  EXPECT_EQ(lumihull({"lightfield", capture(), "--factorization", "svd"}).status, 2);
 }
 
 TEST_F(ProgramTest, NotACapture) {
