@@ -522,8 +522,8 @@ LH_API lh_status lh_capture_export_nerf(lh_context *ctx, const lh_capture *captu
 
 /* ---- new views --------------------------------------------------------------------------------------------------- */
 
-/** Renders new views of a capture that has a hull, or of a model's file. Photographs are read when first needed and kept
- *  for the next view. */
+/** Renders new views of a capture that has a hull, or of a model's file. Photographs are read when first needed and
+ * kept for the next view. */
 typedef struct lh_renderer lh_renderer;
 
 /** method: "light_field" shows the factored model in light_field.glb; "lumigraph" blends photographs on the hull;

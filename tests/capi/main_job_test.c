@@ -178,7 +178,8 @@ static void second_frame(lh_context *ctx, lh_renderer *renderer, const lh_camera
 }
 
 /* A model's file shows what the capture shows by `method`; with_up: it knows which way is up, too. */
-static void render_alone(lh_context *ctx, const lh_capture *capture, const char *method, const char *file, int with_up) {
+static void render_alone(lh_context *ctx, const lh_capture *capture, const char *method, const char *file,
+                         int with_up) {
   static uint8_t of_capture[96 * 72 * 4], alone[96 * 72 * 4];
   lh_renderer *a = NULL, *b = NULL;
   lh_camera camera;
