@@ -11,7 +11,7 @@ namespace {
 
 constexpr float kSamePlace = 0.0017f;  // rad
 constexpr int kNeighbours = 4;
-constexpr float kTowardsMean = 1e-5f;  // pulls values to 0 where nobody looks, in shares of the ordinary trust
+constexpr float kTowardsMean = 1e-3f;  // pulls values to 0 where nobody looks, in shares of the ordinary trust
 
 /// Angle between unit vectors, accurate where it is small.
 float angle_between(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {

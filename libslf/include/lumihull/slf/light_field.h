@@ -74,7 +74,7 @@ struct LightFieldOptions {
   int max_nodes = 96;   ///< places where view maps have values: photographs' places, as many of them at most; 4 … 255
   int max_side = 2048;  ///< largest width and height of the maps, 64 … 16384
   double texel_px = 0.5;  ///< size of a texel in pixels of the photographs, at the median over the surface
-  int iterations = 8;   ///< joint: alternations between surface and view maps, 1 … 100
+  int iterations = 8;     ///< joint: alternations between surface and view maps, 1 … 100
   double surface_ridge =
       0.05;  ///< joint: pulls surface maps towards 0 where photographs say little, in shares of their weight
   double view_smoothness = 0.02;  ///< pulls neighbouring nodes' values together, in shares of the photographs' weight
