@@ -58,6 +58,11 @@ T effective(const Capture& capture, std::string_view stage, std::string_view nam
 void add_photos(const Capture& capture, InputDigest& digest);   ///< stamps of all photographs
 void add_cameras(const Capture& capture, InputDigest& digest);  ///< intrinsics, poses, what is held out
 void add_masks(const Capture& capture, InputDigest& digest);    ///< bytes of all masks
+/// All that a colouring of the hull's surface is made from: photographs, cameras, masks, the hull.
+void add_surface_inputs(const Capture& capture, InputDigest& digest);
+
+/// StageDefinition::needed of a stage that is never left out.
+bool always_needed(const Capture& capture, std::string& why);
 
 std::filesystem::path textured_path(const Capture& capture);
 std::filesystem::path light_field_path(const Capture& capture);

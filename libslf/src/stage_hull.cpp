@@ -38,9 +38,6 @@ hull::HullStageOptions options_of(const Capture& capture) {
   return o;
 }
 
-/// Without poses the stage itself says what is missing; leaving it out would hide that.
-bool needed(const Capture&, std::string&) { return true; }
-
 void inputs(const Capture& capture, InputDigest& digest) {
   add_cameras(capture, digest);
   add_masks(capture, digest);
@@ -89,7 +86,7 @@ const StageDefinition& hull_stage() {
           {"cut_plane", "cut away nx,ny,nz,offset: where n.x > offset (a table)", std::vector<double>()},
           {"cut_box", "cut away the inside of x0,y0,z0,x1,y1,z1 (a support)", std::vector<double>()},
       },
-      needed,
+      always_needed,  // without poses the stage itself says what is missing; leaving it out would hide that
       inputs,
       present,
       run};

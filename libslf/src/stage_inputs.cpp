@@ -55,6 +55,15 @@ void add_masks(const Capture& capture, InputDigest& digest) {
   for (const Shot& shot : capture.shots) digest.add_file("mask " + shot.name, capture.mask_path(shot));
 }
 
+void add_surface_inputs(const Capture& capture, InputDigest& digest) {
+  add_photos(capture, digest);
+  add_cameras(capture, digest);
+  add_masks(capture, digest);
+  digest.add_file("hull", capture.hull_path());
+}
+
+bool always_needed(const Capture&, std::string&) { return true; }
+
 bool file_exists(const std::filesystem::path& file) {
   std::error_code error;
   return std::filesystem::exists(file, error);

@@ -15,15 +15,6 @@ namespace {
 
 constexpr std::int64_t kTriangles = 20000;
 
-bool needed(const Capture&, std::string&) { return true; }
-
-void inputs(const Capture& capture, InputDigest& digest) {
-  add_photos(capture, digest);
-  add_cameras(capture, digest);
-  add_masks(capture, digest);
-  digest.add_file("hull", capture.hull_path());
-}
-
 bool present(const Capture& capture) { return file_exists(light_field_path(capture)); }
 
 std::vector<std::string> run(Capture& capture, Job& job) {
@@ -89,8 +80,8 @@ const StageDefinition& lightfield_stage() {
           {"map_quality", "of the surface maps' JPEGs, 1 to 100; 0: PNG, without loss",
            std::int64_t(file_defaults.map_quality), 0, 100},
       },
-      needed,
-      inputs,
+      always_needed,
+      add_surface_inputs,
       present,
       run};
   return stage;

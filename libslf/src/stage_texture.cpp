@@ -12,15 +12,6 @@ namespace lumihull::slf {
 
 namespace {
 
-bool needed(const Capture&, std::string&) { return true; }
-
-void inputs(const Capture& capture, InputDigest& digest) {
-  add_photos(capture, digest);
-  add_cameras(capture, digest);
-  add_masks(capture, digest);
-  digest.add_file("hull", capture.hull_path());
-}
-
 bool present(const Capture& capture) { return file_exists(textured_path(capture)); }
 
 std::vector<std::string> run(Capture& capture, Job& job) {
@@ -53,8 +44,8 @@ const StageDefinition& texture_stage() {
           {"jpeg_quality", "of the texture in textured.glb, 1 to 100; 0: PNG, without loss",
            std::int64_t(GlbOptions{}.jpeg_quality), 0, 100},
       },
-      needed,
-      inputs,
+      always_needed,
+      add_surface_inputs,
       present,
       run};
   return stage;
