@@ -12,6 +12,7 @@ using namespace lumihull::capi;
 
 struct lh_renderer {
   slf::CaptureRenderer value;
+  bool adaptive = false;
 };
 
 lh_status lh_renderer_create(lh_context* ctx, const lh_capture* capture, const char* method, lh_renderer** out) {
@@ -30,6 +31,10 @@ lh_status lh_renderer_open(lh_context* ctx, const char* file, lh_renderer** out)
 
 void lh_renderer_destroy(lh_renderer* renderer) { delete renderer; }
 
+lh_status lh_renderer_set_adaptive(lh_context* ctx, lh_renderer* renderer, int32_t adaptive) {
+  return guarded(ctx, [&] { given(renderer, "renderer").adaptive = adaptive != 0; });
+}
+
 lh_status lh_renderer_render(lh_context* ctx, lh_renderer* renderer, const lh_camera* camera,
                              const double cam_from_world[12], int32_t rays, uint8_t* rgba, size_t rgba_size,
                              float* depth) {
@@ -43,6 +48,7 @@ lh_status lh_renderer_render(lh_context* ctx, lh_renderer* renderer, const lh_ca
     slf::RenderOptions options;
     options.rays = or_default(int(rays), options.rays);
     options.depth = depth != nullptr;
+    options.adaptive = renderer->adaptive;
     const slf::Rendering rendering = r.render(view, options, job);
     std::memcpy(rgba, rendering.rgba.data(), size);
     if (depth) std::memcpy(depth, rendering.depth.data(), rendering.depth.bytes());

@@ -66,6 +66,8 @@ static void nulls(lh_context *ctx) {
   EXPECT(ctx, LH_EINVAL, lh_capture_export_colmap(ctx, NULL, "x", 0, NULL));
   EXPECT(ctx, LH_EINVAL, lh_renderer_create(ctx, NULL, "lumigraph", NULL));
   EXPECT(ctx, LH_EINVAL, lh_renderer_open(ctx, NULL, NULL));
+  EXPECT(ctx, LH_EINVAL, lh_renderer_set_adaptive(ctx, NULL, 1));
+  CHECK_SAYS(ctx, "renderer");
   EXPECT(ctx, LH_EINVAL, lh_renderer_render(ctx, NULL, &camera, numbers, 0, bytes, 12, NULL));
   EXPECT(ctx, LH_EINVAL, lh_picture_psnr(ctx, NULL, bytes, NULL, 2, 2, numbers));
   EXPECT(ctx, LH_EINVAL, lh_picture_psnr(ctx, bytes, bytes, NULL, 2, 2, NULL));

@@ -201,6 +201,43 @@ static void render_alone(lh_context *ctx, const lh_capture *capture, const char 
   lh_renderer_destroy(b);
 }
 
+/* Rays only where they are needed: the same outline, colours and depth nearly the same, until it is switched off. */
+static void render_adaptively(lh_context *ctx, const lh_capture *capture, const char *method) {
+  enum { kWidth = 160, kHeight = 120, kPixels = kWidth * kHeight };
+  static uint8_t everywhere[4 * kPixels], adaptive[4 * kPixels];
+  static uint8_t rgb[2][3 * kPixels], inside[kPixels];
+  static float depth[2][kPixels];
+  lh_renderer *renderer = NULL;
+  lh_camera camera;
+  double poses[2 * 12], psnr = 0, farthest = 0;
+  size_t i;
+  memset(&camera, 0, sizeof camera);
+  camera.struct_size = sizeof camera;
+  MUST(ctx, lh_renderer_create(ctx, capture, method, &renderer));
+  MUST(ctx, lh_renderer_turntable(ctx, renderer, 2, kWidth, kHeight, 0.3, &camera, poses));
+  MUST(ctx, lh_renderer_render(ctx, renderer, &camera, poses + 12, 4, everywhere, sizeof everywhere, depth[0]));
+  MUST(ctx, lh_renderer_set_adaptive(ctx, renderer, 1));
+  MUST(ctx, lh_renderer_render(ctx, renderer, &camera, poses + 12, 4, adaptive, sizeof adaptive, depth[1]));
+  CHECK(memcmp(adaptive, everywhere, sizeof adaptive) != 0);
+  for (i = 0; i < kPixels; ++i) {
+    CHECK(adaptive[4 * i + 3] == everywhere[4 * i + 3]);
+    memcpy(rgb[0] + 3 * i, everywhere + 4 * i, 3);
+    memcpy(rgb[1] + 3 * i, adaptive + 4 * i, 3);
+    inside[i] = everywhere[4 * i + 3];
+    CHECK(isinf(depth[0][i]) == isinf(depth[1][i]));
+    if (!isinf(depth[0][i]) && fabs(depth[0][i] - depth[1][i]) / depth[0][i] > farthest)
+      farthest = fabs(depth[0][i] - depth[1][i]) / depth[0][i];
+  }
+  MUST(ctx, lh_picture_psnr(ctx, rgb[0], rgb[1], inside, kWidth, kHeight, &psnr));
+  printf("adaptive, %s: PSNR inside %.2f dB; depth off by at most %.2g of it\n", method, psnr, farthest);
+  CHECK(psnr > 32);
+  CHECK(farthest < 0.01);
+  MUST(ctx, lh_renderer_set_adaptive(ctx, renderer, 0));
+  MUST(ctx, lh_renderer_render(ctx, renderer, &camera, poses + 12, 4, adaptive, sizeof adaptive, NULL));
+  CHECK(memcmp(adaptive, everywhere, sizeof adaptive) == 0);
+  lh_renderer_destroy(renderer);
+}
+
 /* Files that are no models. */
 static void open_wrong_files(lh_context *ctx) {
   lh_renderer *renderer = NULL;
@@ -275,6 +312,9 @@ int main(int argc, char **argv) {
   MUST(ctx, lh_capture_run_stage(ctx, capture, "lightfield", 0, on_stage, &said));
   CHECK(strcmp(said.names, "lightfield ") == 0);
   render(ctx, capture, "light_field");
+  render_adaptively(ctx, capture, "light_field");
+  render_adaptively(ctx, capture, "lumigraph");
+  render_adaptively(ctx, capture, "mean_texture");
   render_alone(ctx, capture, "light_field", in(scratch, "job/light_field.glb"), 1);
   render_alone(ctx, capture, "mean_texture", in(scratch, "job/textured.glb"), 0);
   open_wrong_files(ctx);
