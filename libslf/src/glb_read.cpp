@@ -7,6 +7,7 @@
 #include <array>
 #include <cstring>
 #include <span>
+#include <utility>
 
 namespace lumihull::slf {
 namespace {
@@ -101,8 +102,9 @@ std::vector<V> read_vectors(const GlbFile& file, std::size_t index, const char* 
 
 std::size_t glb_index(const JsonReader& value) { return std::size_t(value.integer(0, kMost)); }
 
-GlbFile::GlbFile(const std::filesystem::path& path)
-    : bytes_(read_file(path, std::size_t(kMost))), name_(path.string()) {
+GlbFile::GlbFile(const std::filesystem::path& path) : GlbFile(read_file(path, std::size_t(kMost)), path.string()) {}
+
+GlbFile::GlbFile(std::string bytes, std::string name) : bytes_(std::move(bytes)), name_(std::move(name)) {
   const Chunks chunks = chunks_of(bytes_, name_);
   binary_ = chunks.binary;
   document_ = internal::parse_json(chunks.json, name_);
@@ -141,12 +143,27 @@ std::vector<std::uint32_t> GlbFile::integers(std::size_t index) const {
   return out;
 }
 
+std::span<const std::byte> GlbFile::picture(std::size_t texture) const {
+  const JsonReader image = top().at("images").at(glb_index(top().at("textures").at(texture).at("source")));
+  const std::string_view bytes = view(glb_index(image.at("bufferView")));
+  return std::as_bytes(std::span(bytes.data(), bytes.size()));
+}
+
+std::string GlbFile::texture_name(std::size_t index) const {
+  return name_ + " (texture " + std::to_string(index) + ")";
+}
+
 Image GlbFile::texture(std::size_t index) const {
-  const JsonReader image = top().at("images").at(glb_index(top().at("textures").at(index).at("source")));
-  const std::string_view picture = view(glb_index(image.at("bufferView")));
-  Image out = decode_image(std::as_bytes(std::span(picture.data(), picture.size())),
-                           name_ + " (texture " + std::to_string(index) + ")", {false, 3});
+  Image out = decode_image(picture(index), texture_name(index), {false, 3});
   return out.type() == PixelType::u8 ? std::move(out) : converted(out, PixelType::u8, 3);
+}
+
+Image GlbFile::texture_like(const Image& other, std::size_t index) const {
+  const ImageInfo info = decode_image_info(picture(index), texture_name(index));
+  if (info.width != other.width() || info.height != other.height())
+    bad(texture_name(index), "expected " + std::to_string(other.width()) + " x " + std::to_string(other.height()) +
+                                 " pixels, found " + std::to_string(info.width) + " x " + std::to_string(info.height));
+  return texture(index);
 }
 
 TexturedMesh GlbFile::textured_mesh() const {

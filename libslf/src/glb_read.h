@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,6 +23,8 @@ class GlbFile {
  public:
   /// Errors: not_found, io, bad_input, unsupported.
   explicit GlbFile(const std::filesystem::path& path);
+  /// The same of bytes in memory; `name` is used in errors.
+  GlbFile(std::string bytes, std::string name);
   GlbFile(const GlbFile&) = delete;
   GlbFile& operator=(const GlbFile&) = delete;
 
@@ -37,11 +40,17 @@ class GlbFile {
   std::vector<std::uint32_t> integers(std::size_t accessor) const;
   /// The picture of a texture, 8-bit RGB.
   Image texture(std::size_t index) const;
+  /// The same where it is to be as large as another one: its size is known before it is unpacked.
+  Image texture_like(const Image& other, std::size_t index) const;
 
   /// The primitive as a mesh with texture: its vertices are the file's.
   TexturedMesh textured_mesh() const;
 
  private:
+  /// The bytes of a texture's picture.
+  std::span<const std::byte> picture(std::size_t texture) const;
+  std::string texture_name(std::size_t index) const;
+
   std::string bytes_, name_;
   std::string_view binary_;
   internal::Json document_;

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <memory>
+#include <span>
+#include <utility>
 
 #include "glb_read.h"
 #include "glb_write.h"
@@ -18,7 +20,8 @@ using internal::JsonReader;
 constexpr const char* kExtension = "LUMIHULL_surface_light_field";
 constexpr int kVersion = 1;
 constexpr int kUnsignedShort = 5123, kUnsignedInt = 5125;
-constexpr std::uint64_t kMostViewBytes = std::uint64_t(1) << 31;
+constexpr std::uint64_t kMostMapBytes = std::uint64_t(1) << 32;  // of all terms' maps, unpacked
+constexpr std::size_t kMostInflation = 1032;  // deflate's: a run of 258 bytes takes two bits (RFC 1951, 3.2.5)
 
 bool has_extension(const JsonReader& primitive) {
   return primitive.has("extensions") && primitive.at("extensions").has(kExtension);
@@ -34,7 +37,12 @@ std::string deflated(const std::vector<std::uint8_t>& bytes) {
   return out;
 }
 
-/// nullopt where the bytes are damaged or not exactly `size`.
+/// Of terms that have so many surface maps each.
+std::uint64_t map_bytes(const LightField& field, std::size_t vertices, std::size_t terms, std::size_t maps) {
+  return std::uint64_t(terms) * (std::uint64_t(vertices) * field.nodes.size() + maps * field.base.texture.bytes());
+}
+
+/// No where the bytes are damaged or not exactly as many.
 bool inflate(std::string_view from, std::vector<std::uint8_t>& to) {
   const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> decompressor(
       libdeflate_alloc_decompressor(), libdeflate_free_decompressor);
@@ -71,77 +79,7 @@ std::vector<std::uint32_t> used_vertices(const hull::Mesh& mesh) {
   return out;
 }
 
-}  // namespace
-
-std::string encode_light_field(const LightField& field, const LightFieldFileOptions& options) {
-  validate(field, "light field");
-  if (options.texture_quality < 0 || options.texture_quality > 100 || options.map_quality < 0 ||
-      options.map_quality > 100)
-    throw Error(ErrorCode::invalid_argument, "texture_quality, map_quality: expected 0 (PNG) to 100");
-  GlbBuffer buffer;
-  const FileVertices file = split_vertices(field.base);
-  Json document = textured_document(field.base, file, {.jpeg_quality = options.texture_quality}, buffer);
-
-  const std::vector<std::uint32_t> used = used_vertices(field.base.mesh);
-  std::vector<std::uint32_t> renumbered(field.base.mesh.vertices.size(), 0), vertex_of;
-  for (std::uint32_t i = 0; i < used.size(); ++i) renumbered[used[i]] = i;
-  for (const std::uint32_t v : file.vertex) vertex_of.push_back(renumbered[v]);
-  const bool narrow = used.size() <= 65535;
-  const std::vector<std::uint16_t> narrow_of(narrow ? vertex_of.begin() : vertex_of.end(), vertex_of.end());
-  const std::size_t of_view = narrow ? buffer.add_view(narrow_of.data(), narrow_of.size() * 2)
-                                     : buffer.add_view(vertex_of.data(), vertex_of.size() * 4);
-  Json extension = {{"version", kVersion},
-                    {"vertices", used.size()},
-                    {"vertexOf", buffer.add_accessor({{"bufferView", of_view},
-                                                      {"componentType", narrow ? kUnsignedShort : kUnsignedInt},
-                                                      {"count", vertex_of.size()},
-                                                      {"type", "SCALAR"}})},
-                    {"addsBase", field.adds_base},
-                    {"up", {field.up.x(), field.up.y(), field.up.z()}},
-                    {"nodes", buffer.add_vectors(field.nodes, false, 0)}};
-  if (!field.slot.empty()) {
-    std::vector<std::uint8_t> slots;
-    for (const std::uint32_t v : used) slots.push_back(field.slot[v]);
-    extension["slots"] = buffer.add_view(slots.data(), slots.size());
-  }
-  extension["terms"] = Json::array();
-  for (const LightFieldTerm& term : field.terms) {
-    Json surface = Json::array();
-    for (const Image& map : term.surface) {
-      const bool jpeg = options.map_quality > 0;
-      const std::string picture = jpeg ? encode_jpeg(map, options.map_quality) : encode_png(map);
-      document["images"].push_back({{"bufferView", buffer.add_view(picture.data(), picture.size())},
-                                    {"mimeType", jpeg ? "image/jpeg" : "image/png"}});
-      document["textures"].push_back({{"source", document["images"].size() - 1}, {"sampler", 0}});
-      surface.push_back(document["textures"].size() - 1);
-    }
-    std::vector<std::uint8_t> view;
-    view.reserve(used.size() * field.nodes.size());
-    for (std::size_t i = 0; i < field.nodes.size(); ++i)
-      for (const std::uint32_t v : used) view.push_back(term.view[i * field.base.mesh.vertices.size() + v]);
-    to_differences(view, used.size());
-    const std::string packed = deflated(view);
-    extension["terms"].push_back({{"surface", surface},
-                                  {"surfaceScale", scale_json(term.surface_scale)},
-                                  {"view", buffer.add_view(packed.data(), packed.size())},
-                                  {"viewScale", scale_json(term.view_scale)}});
-  }
-  document["extensionsUsed"].push_back(kExtension);
-  document["meshes"][0]["primitives"][0]["extensions"] = {{kExtension, std::move(extension)}};
-  return pack_glb(std::move(document), buffer);
-}
-
-std::uint64_t write_light_field(const std::filesystem::path& file, const LightField& field,
-                                const LightFieldFileOptions& options) {
-  const std::string bytes = encode_light_field(field, options);
-  write_file(file, bytes);
-  return bytes.size();
-}
-
-bool has_light_field(const std::filesystem::path& path) { return has_extension(GlbFile(path).primitive()); }
-
-LightField read_light_field(const std::filesystem::path& path) {
-  const GlbFile file(path);
+LightField light_field_of(const GlbFile& file) {
   const JsonReader primitive = file.primitive();
   if (!has_extension(primitive))
     throw Error(ErrorCode::bad_input, std::string("the model has no light field: expected the extension ") + kExtension,
@@ -187,24 +125,106 @@ LightField read_light_field(const std::filesystem::path& path) {
   }
   const JsonReader terms = extension.at("terms");
   const std::size_t count = terms.array_size(std::size_t(kMaxTerms));
-  if (std::uint64_t(vertices) * field.nodes.size() > kMostViewBytes)
-    extension.at("vertices").fail("view maps of at most 2 GB");
   for (std::size_t k = 0; k < count; ++k) {
     const JsonReader json = terms.at(k);
     LightFieldTerm term;
     const JsonReader surface = json.at("surface");
     const std::size_t maps = surface.array_size(std::size_t(kMaxSlots));
-    for (std::size_t i = 0; i < maps; ++i) term.surface.push_back(file.texture(glb_index(surface.at(i))));
+    if (map_bytes(field, vertices, count, maps) > kMostMapBytes) terms.fail("maps of at most 4 GB when unpacked");
+    for (std::size_t i = 0; i < maps; ++i)
+      term.surface.push_back(file.texture_like(field.base.texture, glb_index(surface.at(i))));
     term.surface_scale = scale_of(json.at("surfaceScale"));
     term.view_scale = scale_of(json.at("viewScale"));
-    term.view.resize(vertices * field.nodes.size());
-    if (!inflate(file.view(glb_index(json.at("view"))), term.view))
-      json.at("view").fail("zlib data of " + std::to_string(term.view.size()) + " bytes, undamaged");
+    const std::string_view packed = file.view(glb_index(json.at("view")));
+    const std::size_t size = vertices * field.nodes.size();
+    if (size / kMostInflation <= packed.size()) term.view.resize(size);
+    if (term.view.empty() || !inflate(packed, term.view))
+      json.at("view").fail("zlib data of " + std::to_string(size) + " bytes, undamaged");
     from_differences(term.view, vertices);
     field.terms.push_back(std::move(term));
   }
   validate(field, file.name());
   return field;
+}
+
+}  // namespace
+
+std::string encode_light_field(const LightField& field, const LightFieldFileOptions& options) {
+  validate(field, "light field");
+  if (options.texture_quality < 0 || options.texture_quality > 100 || options.map_quality < 0 ||
+      options.map_quality > 100)
+    throw Error(ErrorCode::invalid_argument, "texture_quality, map_quality: expected 0 (PNG) to 100");
+  if (!field.terms.empty() && map_bytes(field, field.base.mesh.vertices.size(), field.terms.size(),
+                                        field.terms[0].surface.size()) > kMostMapBytes)
+    throw Error(ErrorCode::unsupported, "a light field with maps of more than 4 GB");
+  GlbBuffer buffer;
+  const FileVertices file = split_vertices(field.base);
+  Json document = textured_document(field.base, file, {.jpeg_quality = options.texture_quality}, buffer);
+
+  const std::vector<std::uint32_t> used = used_vertices(field.base.mesh);
+  std::vector<std::uint32_t> renumbered(field.base.mesh.vertices.size(), 0), vertex_of;
+  for (std::uint32_t i = 0; i < used.size(); ++i) renumbered[used[i]] = i;
+  for (const std::uint32_t v : file.vertex) vertex_of.push_back(renumbered[v]);
+  const bool narrow = used.size() <= 65535;
+  const std::vector<std::uint16_t> narrow_of(narrow ? vertex_of.begin() : vertex_of.end(), vertex_of.end());
+  const std::size_t of_view = narrow ? buffer.add_view(narrow_of.data(), narrow_of.size() * 2)
+                                     : buffer.add_view(vertex_of.data(), vertex_of.size() * 4);
+  Json extension = {{"version", kVersion},
+                    {"vertices", used.size()},
+                    {"vertexOf", buffer.add_accessor({{"bufferView", of_view},
+                                                      {"componentType", narrow ? kUnsignedShort : kUnsignedInt},
+                                                      {"count", vertex_of.size()},
+                                                      {"type", "SCALAR"}})},
+                    {"addsBase", field.adds_base},
+                    {"up", {field.up.x(), field.up.y(), field.up.z()}},
+                    {"nodes", buffer.add_vectors(field.nodes, false, 0)}};
+  std::size_t maps = 1;  // without those of slots that only vertices without triangles are in
+  if (!field.slot.empty()) {
+    std::vector<std::uint8_t> slots;
+    for (const std::uint32_t v : used) slots.push_back(field.slot[v]);
+    extension["slots"] = buffer.add_view(slots.data(), slots.size());
+    maps = std::size_t(*std::max_element(slots.begin(), slots.end())) + 1;
+  }
+  extension["terms"] = Json::array();
+  for (const LightFieldTerm& term : field.terms) {
+    Json surface = Json::array();
+    for (const Image& map : std::span(term.surface).first(maps)) {
+      const bool jpeg = options.map_quality > 0;
+      const std::string picture = jpeg ? encode_jpeg(map, options.map_quality) : encode_png(map);
+      document["images"].push_back({{"bufferView", buffer.add_view(picture.data(), picture.size())},
+                                    {"mimeType", jpeg ? "image/jpeg" : "image/png"}});
+      document["textures"].push_back({{"source", document["images"].size() - 1}, {"sampler", 0}});
+      surface.push_back(document["textures"].size() - 1);
+    }
+    std::vector<std::uint8_t> view;
+    view.reserve(used.size() * field.nodes.size());
+    for (std::size_t i = 0; i < field.nodes.size(); ++i)
+      for (const std::uint32_t v : used) view.push_back(term.view[i * field.base.mesh.vertices.size() + v]);
+    to_differences(view, used.size());
+    const std::string packed = deflated(view);
+    extension["terms"].push_back({{"surface", surface},
+                                  {"surfaceScale", scale_json(term.surface_scale)},
+                                  {"view", buffer.add_view(packed.data(), packed.size())},
+                                  {"viewScale", scale_json(term.view_scale)}});
+  }
+  document["extensionsUsed"].push_back(kExtension);
+  document["meshes"][0]["primitives"][0]["extensions"] = {{kExtension, std::move(extension)}};
+  return pack_glb(std::move(document), buffer);
+}
+
+std::uint64_t write_light_field(const std::filesystem::path& file, const LightField& field,
+                                const LightFieldFileOptions& options) {
+  const std::string bytes = encode_light_field(field, options);
+  write_file(file, bytes);
+  return bytes.size();
+}
+
+bool has_light_field(const std::filesystem::path& path) { return has_extension(GlbFile(path).primitive()); }
+
+LightField read_light_field(const std::filesystem::path& path) { return light_field_of(GlbFile(path)); }
+
+LightField decode_light_field(std::string bytes, const std::string& name) {
+  return light_field_of(GlbFile(std::move(bytes), name));
 }
 
 }  // namespace lumihull::slf

@@ -81,7 +81,7 @@ void validate(const TexturedMesh& textured, const std::string& name) {
     throw Error(ErrorCode::bad_input, "expected an 8-bit RGB texture", name);
   for (std::size_t i = 0; i < textured.uv.size(); ++i)
     for (const auto& uv : textured.uv[i])
-      if (!(uv.minCoeff() >= 0 && uv.maxCoeff() <= 1))
+      if (!((uv.array() >= 0).all() && (uv.array() <= 1).all()))  // no for NaN, too
         throw Error(ErrorCode::bad_input, "triangle " + std::to_string(i) + " has texture coordinates outside 0 to 1",
                     name);
 }

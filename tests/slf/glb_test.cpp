@@ -167,9 +167,12 @@ TEST(Glb, Faults) {
   EXPECT_EQ(test::expect_error([&] { slf::encode_glb(t, {.jpeg_quality = 101}); }).code(), ErrorCode::invalid_argument);
   t.uv.pop_back();
   EXPECT_EQ(test::expect_error([&] { slf::encode_glb(t); }).code(), ErrorCode::bad_input);
-  t = textured_sphere(4);
-  t.uv[5][1].x() = std::nanf("");
-  EXPECT_EQ(test::expect_error([&] { slf::encode_glb(t); }).code(), ErrorCode::bad_input);
+  for (const int axis : {0, 1})
+    for (const float outside : {std::nanf(""), -0.01f, 1.01f}) {
+      t = textured_sphere(4);
+      t.uv[5][1][axis] = outside;
+      EXPECT_EQ(test::expect_error([&] { slf::encode_glb(t); }).code(), ErrorCode::bad_input) << axis << outside;
+    }
   t = textured_sphere(4);
   t.mesh.triangles.clear(), t.uv.clear();
   EXPECT_EQ(test::expect_error([&] { slf::encode_glb(t); }).code(), ErrorCode::degenerate);

@@ -137,22 +137,25 @@ TEST(LightFieldGlb, IsAPlainModelForWhoKnowsNoLightField) {
   EXPECT_EQ(parts.document["materials"].size(), 1u);
 }
 
-TEST(LightFieldGlb, LeavesOutVerticesThatNobodyUses) {
-  const test::TemporaryFolder folder;
-  slf::LightField field = made_up(false);
-  const std::size_t n = field.base.mesh.vertices.size(), nodes = field.nodes.size();
-  const slf::LightField before = field;
-  field.base.mesh.vertices.push_back({9, 9, 9});
-  for (auto& term : field.terms) {
-    std::vector<std::uint8_t> longer;
-    for (std::size_t i = 0; i < nodes; ++i) {
-      longer.insert(longer.end(), term.view.begin() + std::ptrdiff_t(i * n),
-                    term.view.begin() + std::ptrdiff_t((i + 1) * n));
-      longer.push_back(77);
+TEST(LightFieldGlb, LeavesOutVerticesThatNobodyUsesAndTheirMaps) {
+  for (const bool slots : {false, true}) {
+    slf::LightField field = made_up(slots);
+    const std::size_t n = field.base.mesh.vertices.size(), nodes = field.nodes.size();
+    const slf::LightField before = field;
+    field.base.mesh.vertices.push_back({9, 9, 9});
+    if (slots) field.slot.push_back(std::uint8_t(field.terms[0].surface.size()));
+    for (auto& term : field.terms) {
+      if (slots) term.surface.push_back(term.surface[0]);
+      std::vector<std::uint8_t> longer;
+      for (std::size_t i = 0; i < nodes; ++i) {
+        longer.insert(longer.end(), term.view.begin() + std::ptrdiff_t(i * n),
+                      term.view.begin() + std::ptrdiff_t((i + 1) * n));
+        longer.push_back(77);
+      }
+      term.view = longer;
     }
-    term.view = longer;
+    EXPECT_EQ(slf::encode_light_field(field), slf::encode_light_field(before)) << slots;
   }
-  EXPECT_EQ(slf::encode_light_field(field), slf::encode_light_field(before));
 }
 
 TEST(LightFieldGlb, WrongCountsAndSizesAreNamed) {
@@ -194,6 +197,62 @@ TEST(LightFieldGlb, WrongCountsAndSizesAreNamed) {
   extension_of(newer.document)["version"] = 2;
   write_file(folder / "newer.glb", joined(newer));
   EXPECT_EQ(test::expect_error([&] { slf::read_light_field(folder / "newer.glb"); }).code(), ErrorCode::unsupported);
+}
+
+TEST(LightFieldGlb, SmallFilesOfLargeMapsAreRefusedBeforeTheyAreUnpacked) {
+  const slf::LightField field = made_up(false);
+  const std::string good = slf::encode_light_field(field, {.texture_quality = 0, .map_quality = 0});
+  const auto refusal = [&](const std::function<void(Parts&)>& spoil) {
+    Parts parts = parts_of(good);
+    spoil(parts);
+    const Error e = test::expect_error([&] { slf::decode_light_field(joined(parts), "in memory"); });
+    EXPECT_EQ(e.code(), ErrorCode::bad_input);
+    EXPECT_THAT(e.subject(), testing::HasSubstr("in memory"));
+    return e.message();
+  };
+  // Three bytes of zlib for a view map of 3 nodes x 5000 vertices.
+  EXPECT_THAT(refusal([](Parts& p) {
+                json& e = extension_of(p.document);
+                json& d = p.document;
+                const auto add = [&](std::size_t bytes, std::size_t count, int component, const char* type) {
+                  d["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", p.binary.size()}, {"byteLength", bytes}});
+                  d["accessors"].push_back({{"bufferView", d["bufferViews"].size() - 1},
+                                            {"componentType", component},
+                                            {"count", count},
+                                            {"type", type}});
+                  p.binary.append(bytes, '\0');
+                  return d["accessors"].size() - 1;
+                };
+                json& primitive = d["meshes"][0]["primitives"][0];
+                primitive["attributes"]["POSITION"] = add(60000, 5000, 5126, "VEC3");
+                primitive["attributes"]["TEXCOORD_0"] = add(40000, 5000, 5126, "VEC2");
+                e["vertexOf"] = add(20000, 5000, 5125, "SCALAR");
+                for (std::uint32_t i = 0; i < 5000; ++i) std::memcpy(&p.binary[p.binary.size() - 20000 + 4 * i], &i, 4);
+                e["vertices"] = 5000;
+                d["bufferViews"][e["terms"][0]["view"].get<std::size_t>()]["byteLength"] = 3;
+              }),
+              testing::HasSubstr("zlib data of 15000 bytes"));
+  // A surface map that says that it is larger than the texture.
+  EXPECT_THAT(refusal([&](Parts& p) {
+                const std::string large = encode_png(Image(3000, 2000, 3));
+                p.document["bufferViews"].push_back(
+                    {{"buffer", 0}, {"byteOffset", p.binary.size()}, {"byteLength", large.size()}});
+                p.document["images"][1]["bufferView"] = p.document["bufferViews"].size() - 1;
+                p.binary += large + std::string((4 - large.size() % 4) % 4, '\0');
+              }),
+              testing::HasSubstr("expected 20 x 12 pixels, found 3000 x 2000"));
+  // 12 x 16 surface maps of 24 MB: the file needs to hold but one.
+  EXPECT_THAT(refusal([&](Parts& p) {
+                const std::string large = encode_png(Image(4000, 2000, 3));
+                p.document["bufferViews"].push_back(
+                    {{"buffer", 0}, {"byteOffset", p.binary.size()}, {"byteLength", large.size()}});
+                p.document["images"][0]["bufferView"] = p.document["bufferViews"].size() - 1;
+                p.binary += large + std::string((4 - large.size() % 4) % 4, '\0');
+                json term = extension_of(p.document)["terms"][0];
+                term["surface"] = std::vector<int>(16, 0);
+                extension_of(p.document)["terms"] = std::vector<json>(12, term);
+              }),
+              testing::HasSubstr("maps of at most 4 GB"));
 }
 
 TEST(LightFieldGlb, DamagedFilesAreRefusedOrRead) {
