@@ -1,10 +1,17 @@
 #include "html.h"
 
+#include <lumihull/slf/metrics.h>
+
 #include <algorithm>
-#include <cstdint>
+#include <array>
+#include <cmath>
+#include <cstdio>
 
 namespace lumihull::slf {
 namespace {
+
+constexpr std::array<std::uint8_t, 3> kBehind{102, 102, 119};  // in light and in dark surroundings
+constexpr int kJpegQuality = 85;
 
 std::string base64(std::string_view bytes) {
   static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -47,10 +54,21 @@ std::string html_escaped(std::string_view text) {
   return out;
 }
 
-std::string data_url(const Image& picture, int jpeg_quality) {
-  if (picture.channels() == 4) return "data:image/png;base64," + base64(encode_png(picture));
-  return "data:image/jpeg;base64," + base64(encode_jpeg(picture, jpeg_quality));
+std::string figure(const Image& picture, const std::string& caption) {
+  const std::string jpeg = encode_jpeg(picture.channels() == 4 ? composited(picture, kBehind) : picture, kJpegQuality);
+  return "<figure><img loading=\"lazy\" width=\"" + std::to_string(picture.width()) + "\" height=\"" +
+         std::to_string(picture.height()) + "\" alt=\"" + html_escaped(caption) + "\" src=\"data:image/jpeg;base64," +
+         base64(jpeg) + "\"><figcaption>" + html_escaped(caption) + "</figcaption></figure>\n";
 }
+
+std::string formatted(const char* format, double value) {
+  if (!std::isfinite(value)) return "–";
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string megabytes(std::uint64_t bytes) { return formatted("%.1f MB", double(bytes) / 1e6); }
 
 Image fitted(const Image& picture, int side) {
   const int factor_w = (picture.width() + side - 1) / side, factor_h = (picture.height() + side - 1) / side;

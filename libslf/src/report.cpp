@@ -7,11 +7,11 @@
 #include <lumihull/slf/report.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 #include <filesystem>
 
 #include "html.h"
+#include "report_sections.h"
+#include "stage.h"
 
 namespace lumihull::slf {
 namespace {
@@ -19,36 +19,24 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kSheetPhotos = 48;  // pictures on the contact sheet: enough to see what went wrong, small to send
-constexpr int kThumbnail = 220, kModelPicture = 420, kComparison = 1400;
+constexpr int kHullFrames = 4;
+constexpr int kThumbnail = 220, kModelPicture = 420;
 
 constexpr const char* kStyle = R"(
 :root{color-scheme:light dark;--line:#8884;--dim:#777}
 body{font:16px/1.5 system-ui,sans-serif;margin:0 auto;max-width:72rem;padding:1rem}
-h1{margin:.5rem 0}h2{margin:2rem 0 .5rem;border-bottom:1px solid var(--line)}
+h1{margin:.5rem 0}h2{margin:2rem 0 .5rem;border-bottom:1px solid var(--line)}h3{margin:1.2rem 0 .3rem;font-size:1rem}
 p{margin:.4rem 0}.dim{color:var(--dim);font-size:.875rem}
 .grid{display:grid;gap:.6rem;grid-template-columns:repeat(auto-fill,minmax(9rem,1fr))}
 .wide{grid-template-columns:repeat(auto-fill,minmax(14rem,1fr))}
+.compared{grid-template-columns:repeat(auto-fit,minmax(10rem,1fr));align-items:start}
+.strips{display:grid;gap:.6rem}
 figure{margin:0;border:1px solid var(--line);border-radius:.4rem;overflow:hidden}
-figure img{display:block;width:100%}figcaption{padding:.15rem .4rem;font-size:.8rem;overflow-wrap:anywhere}
-.check{background:#667 repeating-conic-gradient(#0002 0 25%,#0000 0 50%) 0/16px 16px}
+figure img{display:block;width:100%;height:auto}figcaption{padding:.15rem .4rem;font-size:.8rem;overflow-wrap:anywhere}
 .scroll{overflow-x:auto}table{border-collapse:collapse}
 td,th{padding:.2rem .7rem;border-bottom:1px solid var(--line);text-align:right;white-space:nowrap}
-td:first-child,th:first-child{text-align:left}
+td:first-child,th:first-child{text-align:left}summary{cursor:pointer;margin:.4rem 0}
 )";
-
-std::string formatted(const char* format, double value) {
-  if (!std::isfinite(value)) return "–";
-  char text[64];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
-
-std::string megabytes(std::uint64_t bytes) { return formatted("%.1f MB", double(bytes) / 1e6); }
-
-std::string figure(const Image& picture, const std::string& caption, const char* style = "") {
-  return "<figure><img class=\"" + std::string(style) + "\" loading=\"lazy\" alt=\"" + html_escaped(caption) +
-         "\" src=\"" + data_url(picture) + "\"><figcaption>" + html_escaped(caption) + "</figcaption></figure>\n";
-}
 
 /// What lies outside the mask becomes pale, so that both the photograph and its silhouette are seen.
 Image outlined(const Photo& photo) {
@@ -106,6 +94,8 @@ TurntableOptions around(int frames) {
   return o;
 }
 
+std::string degrees(int frame, int frames) { return formatted("%.0f°", 360.0 * frame / frames); }
+
 void add_hull(std::string& page, const Capture& capture, Job& job) {
   const hull::Mesh mesh = hull::read_mesh(capture.hull_path());
   if (mesh.triangles.empty()) return;
@@ -114,9 +104,10 @@ void add_hull(std::string& page, const Capture& capture, Job& job) {
           std::to_string(mesh.vertices.size()) + " vertices, volume " + formatted("%.4g", hull::enclosed_volume(mesh)) +
           (capture.unit == Unit::metres ? " m³" : " in the capture's unit") + "</p>\n<div class=\"grid wide\">\n";
   Job quiet({}, job.threads());
-  for (const PathView& v : turntable(mesh, positioned_views(capture), around(4))) {
+  int frame = 0;
+  for (const PathView& v : turntable(mesh, positioned_views(capture), around(kHullFrames))) {
     job.check();
-    page += figure(render_shaded(mesh, scene, v.view, {}, quiet).rgba, "hull", "check");
+    page += figure(render_shaded(mesh, scene, v.view, {}, quiet).rgba, degrees(frame++, kHullFrames));
     job.advance();
   }
   page += "</div>\n";
@@ -129,39 +120,13 @@ void add_model(std::string& page, const Capture& capture, int frames, const fs::
           std::to_string(textured.texture.width()) + " × " + std::to_string(textured.texture.height()) + ", " +
           megabytes(fs::file_size(model)) + "</p>\n<div class=\"grid wide\">\n";
   Job quiet({}, job.threads());
+  int frame = 0;
   for (const PathView& v : turntable(textured.mesh, positioned_views(capture), around(frames))) {
     job.check();
-    page += figure(render_texture(textured, scene, v.view, {}, quiet).rgba, v.name, "check");
+    page += figure(render_texture(textured, scene, v.view, {3, false, true}, quiet).rgba, degrees(frame++, frames));
     job.advance();
   }
   page += "</div>\n";
-}
-
-void add_row(std::string& page, const std::string& name, double iou, const std::string& method,
-             const PictureQuality& q) {
-  page += "<tr><td>" + html_escaped(name) + "</td><td>" + html_escaped(method) + "</td><td>" +
-          formatted("%.2f", q.psnr) + "</td><td>" + formatted("%.4f", q.ssim) + "</td><td>" +
-          formatted("%.2f", q.psnr_inside) + "</td><td>" + formatted("%.4f", q.ssim_inside) + "</td><td>" +
-          formatted("%.4f", iou) + "</td></tr>\n";
-}
-
-void add_evaluation(std::string& page, const Capture& capture, const Evaluation& e) {
-  page += "<h2>Held-out photographs</h2>\n<p>" + std::to_string(e.photos_used) + " photographs used, " +
-          std::to_string(e.photos_held_out) + " held out. Silhouettes of the rendered hull: IoU " +
-          formatted("%.4f", e.mean.silhouette_iou) +
-          (std::isnan(e.mean.keyed_iou) ? "" : "; keyed silhouettes: IoU " + formatted("%.4f", e.mean.keyed_iou)) +
-          ".</p>\n<div class=\"scroll\"><table><tr><th>photograph</th><th>method</th><th>PSNR, dB</th><th>SSIM</th>"
-          "<th>PSNR inside</th><th>SSIM inside</th><th>hull's IoU</th></tr>\n";
-  for (const auto& [method, q] : e.mean.methods) add_row(page, "mean", e.mean.silhouette_iou, method, q);
-  for (const ViewEvaluation& v : e.views)
-    for (const auto& [method, q] : v.methods) add_row(page, v.name, v.silhouette_iou, method, q);
-  page += "</table></div>\n<p class=\"dim\">Below: photograph, rendering, four times their difference.</p>\n";
-  for (const ViewEvaluation& v : e.views)
-    for (const auto& [method, q] : v.methods) {
-      const fs::path file = capture.folder() / "evaluate" / (v.name + "." + method + ".png");
-      if (fs::exists(file))
-        page += figure(fitted(read_image(file, {.channels = 3}), kComparison), v.name + ", " + method);
-    }
 }
 
 void add_stages(std::string& page, const Capture& capture) {
@@ -186,12 +151,14 @@ void write_report(const Capture& capture, const ReportOptions& options, Job& job
     for (std::size_t i = 0; i < capture.shots.size(); ++i) n += is(i);
     return n;
   };
-  const bool has_hull = fs::exists(capture.hull_path());
-  const fs::path model = capture.folder() / "textured.glb";
-  const bool has_model = fs::exists(model);
+  const fs::path light_field = light_field_path(capture), model = textured_path(capture);
+  const bool has_hull = file_exists(capture.hull_path()),
+             has_light_field = file_exists(light_field) && options.turntable_frames > 0,
+             has_model = file_exists(model) && options.turntable_frames > 0;
 
-  job.begin("report", std::min(capture.shots.size(), kSheetPhotos) + (has_hull ? 4u : 0u) +
-                          (has_model ? std::size_t(options.turntable_frames) : 0u));
+  const auto frames = std::size_t(options.turntable_frames);
+  job.begin("report", std::min(capture.shots.size(), kSheetPhotos) + (has_hull ? std::size_t(kHullFrames) : 0) +
+                          (has_light_field ? frames + 2 * std::size_t(kFanPictures) : 0) + (has_model ? frames : 0));
   std::string page =
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>" +
@@ -201,9 +168,11 @@ void write_report(const Capture& capture, const ReportOptions& options, Job& job
       std::to_string(count_if([&](std::size_t i) { return capture.held_out(i); })) +
       " held out; unit: " + (capture.unit == Unit::metres ? "metres" : "unknown") + ".</p>\n";
   for (const std::string& note : capture.notes) page += "<p class=\"dim\">" + html_escaped(note) + "</p>\n";
-  if (has_model && options.turntable_frames > 0) add_model(page, capture, options.turntable_frames, model, job);
+  if (has_light_field)
+    add_light_field(page, light_field, positioned_views(capture), around(options.turntable_frames), job);
+  if (options.evaluation) add_evaluation(page, capture, *options.evaluation, job);
+  if (has_model) add_model(page, capture, options.turntable_frames, model, job);
   if (has_hull) add_hull(page, capture, job);
-  if (options.evaluation) add_evaluation(page, capture, *options.evaluation);
   if (!capture.shots.empty()) add_photographs(page, capture, job);
   if (!capture.stages.empty()) add_stages(page, capture);
   page += "</body></html>\n";

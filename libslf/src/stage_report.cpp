@@ -18,21 +18,46 @@ double number_or_nan(const JsonReader& json, std::string_view key) {
   return json.at(key).number();
 }
 
+std::map<std::string, PictureQuality> read_methods(const JsonReader& json) {
+  std::map<std::string, PictureQuality> out;
+  if (!json.value().is_object()) json.fail("an object");
+  for (const auto& item : json.value().items()) {
+    const JsonReader m = json.at(item.key());
+    out[item.key()] = {.psnr = number_or_nan(m, "psnr"),
+                       .ssim = number_or_nan(m, "ssim"),
+                       .psnr_inside = number_or_nan(m, "psnr_inside"),
+                       .ssim_inside = number_or_nan(m, "ssim_inside")};
+  }
+  return out;
+}
+
 ViewEvaluation read_view(const JsonReader& json) {
   ViewEvaluation view;
   if (json.has("name")) view.name = json.at("name").string();
   view.silhouette_iou = number_or_nan(json, "silhouette_iou");
   view.keyed_iou = number_or_nan(json, "keyed_iou");
-  const JsonReader methods = json.at("methods");
-  if (!methods.value().is_object()) methods.fail("an object");
-  for (const auto& item : methods.value().items()) {
-    const JsonReader m = methods.at(item.key());
-    view.methods[item.key()] = {.psnr = number_or_nan(m, "psnr"),
-                                .ssim = number_or_nan(m, "ssim"),
-                                .psnr_inside = number_or_nan(m, "psnr_inside"),
-                                .ssim_inside = number_or_nan(m, "ssim_inside")};
-  }
+  view.methods = read_methods(json.at("methods"));
   return view;
+}
+
+TestViewEvaluation read_test_views(const JsonReader& json) {
+  TestViewEvaluation out;
+  out.views = std::size_t(json.at("views").integer(0, 1'000'000));
+  out.methods = read_methods(json.at("methods"));
+  if (!json.has("highlights")) return out;
+  const JsonReader highlights = json.at("highlights");
+  if (!highlights.value().is_object()) highlights.fail("an object");
+  for (const auto& item : highlights.value().items()) {
+    const JsonReader h = highlights.at(item.key());
+    HighlightPath& path = out.highlights[item.key()];
+    path.lamp = int(h.at("lamp").integer(0, 1'000'000));
+    path.views = std::size_t(h.at("views").integer(0, 1'000'000));
+    path.found = std::size_t(h.at("found").integer(0, 1'000'000));
+    path.true_length_px = number_or_nan(h, "true_length_px");
+    path.share = number_or_nan(h, "share");
+    path.rms_px = number_or_nan(h, "rms_px");
+  }
+  return out;
 }
 
 /// What the stage `evaluate` found, if it ran: evaluate/evaluation.json.
@@ -49,6 +74,7 @@ std::optional<Evaluation> read_evaluation(const Capture& capture) {
   evaluation.mean = read_view(top);
   if (top.has("light_field_bytes"))
     evaluation.light_field_bytes = std::uint64_t(top.at("light_field_bytes").integer(0, INT64_MAX));
+  if (top.has("test_views")) evaluation.test_views = read_test_views(top.at("test_views"));
   const JsonReader views = top.at("views");
   const std::size_t n = views.array_size(1'000'000);
   for (std::size_t i = 0; i < n; ++i) evaluation.views.push_back(read_view(views.at(i)));
@@ -81,7 +107,7 @@ std::vector<std::string> run(Capture& capture, Job& job) {
 }  // namespace
 
 const StageDefinition& report_stage() {
-  static const StageDefinition stage{"report", 1, {}, needed, inputs, present, run};
+  static const StageDefinition stage{"report", 2, {}, needed, inputs, present, run};
   return stage;
 }
 
