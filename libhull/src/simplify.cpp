@@ -2,14 +2,24 @@
 #include <lumihull/hull/mesh_check.h>
 #include <lumihull/hull/simplify.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+// OpenMesh asserts at every access that a property's type has the expected name, as text: half of the time and more.
+#ifndef NDEBUG
+#define NDEBUG
+#define LUMIHULL_OPENMESH_ASSERTS
+#endif
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <OpenMesh/Tools/Decimater/DecimaterT.hh>
 #include <OpenMesh/Tools/Decimater/ModHausdorffT.hh>
 #include <OpenMesh/Tools/Decimater/ModNormalFlippingT.hh>
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
-#include <algorithm>
-#include <array>
-#include <cmath>
+#ifdef LUMIHULL_OPENMESH_ASSERTS
+#undef NDEBUG
+#include <cassert>
+#endif
 
 namespace lumihull::hull {
 namespace {

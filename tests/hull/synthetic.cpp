@@ -43,17 +43,26 @@ Shape capsule(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius)
 
 Shape torus(double major, double minor) {
   return [=](const Eigen::Vector3d& o, const Eigen::Vector3d& direction) {
+    // (|p|² + R² - r²)² - 4 R² (x² + y²) along the ray is a quartic, negative within; s counts from the ray's place m
+    // that is nearest to the origin. It is least at a root of its derivative, s³ + a s + b.
     const Eigen::Vector3d d = direction.normalized();
-    const double middle = -o.dot(d), reach = major + minor;
-    double t = std::max(middle - reach, 0.0);
-    for (int step = 0; step < 200 && t < middle + reach; ++step) {
-      const Eigen::Vector3d p = o + t * d;
-      const double across = std::sqrt(p.x() * p.x() + p.y() * p.y()) - major;
-      const double distance = std::sqrt(across * across + p.z() * p.z()) - minor;
-      if (distance < 1e-5) return true;
-      t += distance;
+    const double middle = -o.dot(d);
+    const Eigen::Vector3d m = o + middle * d;
+    const double k = m.squaredNorm() + major * major - minor * minor, four = 4 * major * major;
+    const double a = k - four / 2 * d.head<2>().squaredNorm(), b = -four / 2 * m.head<2>().dot(d.head<2>());
+    const auto within = [&](double s) {
+      const double square = s * s + k;
+      return s + middle > 0 && square * square <= four * (m + s * d).head<2>().squaredNorm();
+    };
+    const double discriminant = b * b / 4 + a * a * a / 27;
+    if (discriminant > 0) {  // one root (Cardano), its larger part first
+      const double u = std::cbrt(-b / 2 - std::copysign(std::sqrt(discriminant), b));
+      return within(u - a / (3 * u));
     }
-    return false;
+    const double r = std::sqrt(-a / 3), angle = r > 0 ? std::acos(std::clamp(-b / (2 * r * r * r), -1.0, 1.0)) / 3 : 0;
+    constexpr double kThird = 2 * std::numbers::pi / 3;
+    return within(2 * r * std::cos(angle)) || within(2 * r * std::cos(angle + kThird)) ||
+           within(2 * r * std::cos(angle - kThird));
   };
 }
 
