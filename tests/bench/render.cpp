@@ -14,82 +14,25 @@
 #include <lumihull/slf/textured_mesh.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <limits>
-#include <numbers>
+
+#include "bumpy_ball.h"
 
 using namespace lumihull;
 
 namespace {
 
-double fastest(int times, const std::function<void()>& body) {
-  double best = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < times; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    body();
-    best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-  }
-  return best;
-}
-
-hull::Mesh bumpy_ball(int steps) {
-  hull::Mesh mesh;
-  const int columns = 2 * steps;
-  const auto add = [&](double a, double b) {
-    const double r = 1 + 0.05 * std::sin(9 * b) * std::sin(a) * std::sin(7 * a);
-    mesh.vertices.push_back(
-        Eigen::Vector3d(r * std::sin(a) * std::cos(b), r * std::sin(a) * std::sin(b), r * std::cos(a)).cast<float>());
-  };
-  add(0, 0);
-  for (int i = 1; i < steps; ++i)
-    for (int j = 0; j < columns; ++j) add(std::numbers::pi * i / steps, 2 * std::numbers::pi * j / columns);
-  add(std::numbers::pi, 0);
-  const auto at = [&](int i, int j) { return std::uint32_t(1 + (i - 1) * columns + j % columns); };
-  const auto last = std::uint32_t(mesh.vertices.size() - 1);
-  for (int j = 0; j < columns; ++j) {
-    mesh.triangles.push_back({0, at(1, j), at(1, j + 1)});
-    for (int i = 1; i + 1 < steps; ++i) {
-      mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
-      mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
-    }
-    mesh.triangles.push_back({at(steps - 1, j), last, at(steps - 1, j + 1)});
-  }
-  return mesh;
-}
-
-/// A photograph of the ball as seen by one ray a pixel: coloured bands by the place on the surface.
-slf::Photo photograph(const hull::RayScene& scene, const View& view) {
-  const Camera& c = view.camera;
-  slf::Photo photo{Image(c.width, c.height, 3), Image(c.width, c.height, 1)};
-  const Eigen::Vector3f eye = view.center().cast<float>();
-  const Eigen::Matrix3d rotation = view.cam_from_world.rotation.conjugate().toRotationMatrix();
-  for (int y = 0; y < c.height; ++y)
-    for (int x = 0; x < c.width; ++x) {
-      const hull::Ray ray{eye, (rotation * *c.ray({x + 0.5, y + 0.5})).cast<float>()};
-      const hull::Hit hit = scene.hit(ray);
-      if (!hit) continue;
-      const Eigen::Vector3f p = eye + hit.t * ray.direction;
-      photo.alpha.row<std::uint8_t>(y)[x] = 255;
-      for (int k = 0; k < 3; ++k)
-        photo.rgb.row<std::uint8_t>(y)[3 * x + k] =
-            std::uint8_t(127.5f + 60 * std::sin(20 * p[k] + 5 * p[(k + 1) % 3]) + 40 * std::sin(90 * p[(k + 2) % 3]));
-    }
-  return photo;
-}
-
 /// A light field over a textured mesh: its texture shifted about for surface maps, waves over the nodes for view maps.
 slf::LightField light_field(const slf::TexturedMesh& base, int terms, int nodes, double distance) {
   slf::LightField field;
   field.base = base;
-  for (int i = 0; i < nodes; ++i) {
-    const double z = 0.98 - 1.96 * (i + 0.5) / nodes, a = i * 2.399963, r = std::sqrt(1 - z * z);
-    field.nodes.push_back((distance * Eigen::Vector3d(r * std::cos(a), r * std::sin(a), z)).cast<float>());
-  }
+  for (const Eigen::Vector3d& direction : bench::spiral(nodes, 0.98))
+    field.nodes.push_back((distance * direction).cast<float>());
   const std::size_t vertices = base.mesh.vertices.size();
   for (int k = 0; k < terms; ++k) {
     slf::LightFieldTerm term;
@@ -189,18 +132,13 @@ int main(int argc, char** argv) {
   if (width < 16 || height < 16 || width > 8192 || height > 8192) return std::fprintf(stderr, "bad arguments\n"), 2;
 
   Job job;
-  const hull::Mesh mesh = bumpy_ball(71);
+  const hull::Mesh mesh = bench::bumpy_ball(71);
   const hull::RayScene scene(mesh);
   Camera camera;
   camera.width = 960, camera.height = 960, camera.f = 1700, camera.u0 = camera.v0 = 480;
-  slf::PhotoSet photos;
-  for (int i = 0; i < 16; ++i) {
-    const double z = 0.9 - 1.8 * (i + 0.5) / 16, a = i * 2.399963, r = std::sqrt(1 - z * z);
-    photos.names.push_back(std::to_string(i));
-    photos.views.push_back({camera, look_at(4 * Eigen::Vector3d(r * std::cos(a), r * std::sin(a), z),
-                                            Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ())});
-  }
-  photos.read = [&](std::size_t i) { return photograph(scene, photos.views[i]); };
+  const slf::PhotoSet photos = bench::photographs(scene, camera, 16, 0.9, [](const Eigen::Vector3f& p, int k) {
+    return 127.5f + 60 * std::sin(20 * p[k] + 5 * p[(k + 1) % 3]) + 40 * std::sin(90 * p[(k + 2) % 3]);
+  });
   slf::TextureOptions options;
   options.texel_px = 1.75;
   const slf::TexturedMesh textured = slf::mean_texture(mesh, photos, options, job);
@@ -238,13 +176,13 @@ int main(int argc, char** argv) {
     double embree;
     {
       const Peer peer(mesh, view, o.rays);
-      embree = fastest(10, [&] { peer.trace(job); });
+      embree = bench::fastest(10, [&] { peer.trace(job); });
     }
     reset_peak_memory();
     std::printf("%d x %d %-14s %8.1f", o.rays, o.rays, o.adaptive ? "adaptive" : "", 1 / embree);
     for (std::size_t m = 0; m < 4; ++m) {
       slf::Rendering r;
-      const double time = fastest(10, [&] { r = methods[m](o); });
+      const double time = bench::fastest(10, [&] { r = methods[m](o); });
       std::printf("   %7.1f (%4.1f)", 1 / time, slf::psnr(flat(r), flat(best[m])));
     }
     std::printf(" %10.0f\n", double(peak_memory_bytes()) / 1e6);

@@ -12,73 +12,16 @@
 #include <lumihull/slf/renderer.h>
 #include <lumihull/slf/textured_mesh.h>
 
-#include <chrono>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <functional>
-#include <numbers>
+
+#include "bumpy_ball.h"
 
 using namespace lumihull;
 
-namespace {
-
-double seconds(const std::function<void()>& body) {
-  const auto start = std::chrono::steady_clock::now();
-  body();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-double fastest(int times, const std::function<void()>& body) {
-  double best = seconds(body);
-  for (int i = 1; i < times; ++i) best = std::min(best, seconds(body));
-  return best;
-}
-
-hull::Mesh bumpy_ball(int steps) {
-  hull::Mesh mesh;
-  const int columns = 2 * steps;
-  for (int i = 0; i <= steps; ++i)
-    for (int j = 0; j < columns; ++j) {
-      const double a = std::numbers::pi * i / steps, b = 2 * std::numbers::pi * j / columns;
-      const double r = 1 + 0.05 * std::sin(9 * b) * std::sin(a) * std::sin(7 * a);
-      mesh.vertices.push_back(
-          Eigen::Vector3d(r * std::sin(a) * std::cos(b), r * std::sin(a) * std::sin(b), r * std::cos(a)).cast<float>());
-    }
-  const auto at = [&](int i, int j) { return std::uint32_t(i * columns + j % columns); };
-  for (int i = 0; i < steps; ++i)
-    for (int j = 0; j < columns; ++j) {
-      if (i + 1 < steps) mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
-      if (i > 0) mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
-    }
-  return mesh;
-}
-
-/// Coloured bands by the place on the surface; one ray a pixel.
-slf::Photo photograph(const hull::RayScene& scene, const View& view) {
-  const Camera& c = view.camera;
-  slf::Photo photo{Image(c.width, c.height, 3), Image(c.width, c.height, 1)};
-  const Eigen::Vector3f eye = view.center().cast<float>();
-  const Eigen::Matrix3d rotation = view.cam_from_world.rotation.conjugate().toRotationMatrix();
-  std::vector<hull::Ray> rays;
-  std::vector<hull::Hit> hits(std::size_t(c.width));
-  for (int y = 0; y < c.height; ++y) {
-    rays.clear();
-    for (int x = 0; x < c.width; ++x) rays.push_back({eye, (rotation * *c.ray({x + 0.5, y + 0.5})).cast<float>()});
-    scene.hit(rays, hits);
-    for (int x = 0; x < c.width; ++x) {
-      if (!hits[std::size_t(x)]) continue;
-      const Eigen::Vector3f p = eye + hits[std::size_t(x)].t * rays[std::size_t(x)].direction;
-      photo.alpha.row<std::uint8_t>(y)[x] = 255;
-      for (int k = 0; k < 3; ++k)
-        photo.rgb.row<std::uint8_t>(y)[3 * x + k] =
-            std::uint8_t(127.5f + 100 * std::sin(20 * p[k] + 5 * p[(k + 1) % 3]));
-    }
-  }
-  return photo;
-}
-
-}  // namespace
+using bench::fastest, bench::seconds;
 
 int main(int argc, char** argv) {
   const int count = argc > 1 ? std::atoi(argv[1]) : 600;
@@ -86,19 +29,15 @@ int main(int argc, char** argv) {
   if (count < 1 || !(megapixels > 0.001 && megapixels < 50)) return std::fprintf(stderr, "bad arguments\n"), 2;
 
   Job job;
-  const hull::Mesh mesh = bumpy_ball(122);  // about 60,000 triangles
+  const hull::Mesh mesh = bench::bumpy_ball(122);  // about 60,000 triangles
   const hull::RayScene scene(mesh);
   Camera camera;
   camera.width = int(std::sqrt(megapixels * 1e6 * 1.5)), camera.height = int(camera.width / 1.5);
   camera.f = 1.7 * camera.height, camera.u0 = 0.5 * camera.width, camera.v0 = 0.5 * camera.height;
-  slf::PhotoSet photos;
-  for (int i = 0; i < count; ++i) {  // a spiral over the sphere of directions
-    const double z = 0.95 - 1.9 * (i + 0.5) / count, a = i * 2.399963, r = std::sqrt(1 - z * z);
-    photos.names.push_back(std::to_string(i));
-    photos.views.push_back({camera, look_at(4 * Eigen::Vector3d(r * std::cos(a), r * std::sin(a), z),
-                                            Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ())});
-  }
-  photos.read = [&](std::size_t i) { return photograph(scene, photos.views[i]); };
+  const bench::Paint bands = [](const Eigen::Vector3f& p, int k) {
+    return 127.5f + 100 * std::sin(20 * p[k] + 5 * p[(k + 1) % 3]);
+  };
+  const slf::PhotoSet photos = bench::photographs(scene, camera, count, 0.95, bands);
   std::printf("%d photographs of %d x %d, %zu triangles, %u threads\n", count, camera.width, camera.height,
               mesh.triangles.size(), job.threads());
 
@@ -117,7 +56,7 @@ int main(int argc, char** argv) {
   path.frames = 3, path.start_deg = 11;
   const auto frames = slf::turntable(mesh, photos.views, path);
   const View view = frames[0].view;
-  const slf::Photo truth = photograph(scene, view);
+  const slf::Photo truth = bench::photograph(scene, view, bands);
   const Image reference = slf::composited(truth.rgb, truth.alpha, {0, 0, 0});
   const auto quality = [&](const slf::Rendering& r) {
     return slf::psnr(slf::composited(r.rgba, {0, 0, 0}), reference, &truth.alpha);

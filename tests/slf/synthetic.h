@@ -11,6 +11,8 @@
 #include <functional>
 #include <vector>
 
+#include "ball.h"
+
 namespace lumihull::test {
 
 /// 8-bit sRGB colour of a place on the surface.
@@ -20,8 +22,6 @@ using Paint = std::function<Eigen::Vector3f(const Eigen::Vector3f&)>;
 Paint bands();
 Paint plain(int r, int g, int b);
 
-/// Sphere of radius 1 around the origin; 2 * steps² triangles or so.
-hull::Mesh sphere(int steps);
 /// Axis-parallel box, two triangles a face.
 hull::Mesh box(const Eigen::Vector3f& low, const Eigen::Vector3f& high);
 hull::Mesh merged(const hull::Mesh& a, const hull::Mesh& b);
