@@ -94,7 +94,7 @@ std::vector<View> light_fan(const LightField& field, const hull::RayScene& scene
 
   struct Place {
     std::size_t vertex, node;
-    double change;  // variance of lightness over the nodes
+    double change;  // variance of lightness over the nodes, less for what is seen at a slant
   };
   std::vector<Place> places;
   std::vector<std::size_t> around;
@@ -121,8 +121,8 @@ std::vector<View> light_fan(const LightField& field, const hull::RayScene& scene
       sum += value, squares += value * value, ++seen;
     }
     if (seen < kFewestNodes) continue;
-    // What is seen at a slant makes a poor picture.
-    places.push_back({v, node, best * best * (squares / double(seen) - sum * sum / double(seen * seen))});
+    const double mean = sum / double(seen), change = squares / double(seen) - mean * mean;
+    if (std::isfinite(change)) places.push_back({v, node, best * best * change});  // at a slant: a poor picture
   }
   std::stable_sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.change > b.change; });
 
