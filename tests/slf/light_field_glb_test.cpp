@@ -137,6 +137,33 @@ TEST(LightFieldGlb, IsAPlainModelForWhoKnowsNoLightField) {
   EXPECT_EQ(parts.document["materials"].size(), 1u);
 }
 
+TEST(LightFieldGlb, WhatTheFormatAsksOfAFileHoldsForWhatTheExtensionAdds) {
+  for (const bool slots : {false, true})
+    for (const int quality : {0, 60}) {
+      const Parts parts = parts_of(slf::encode_light_field(made_up(slots), {.map_quality = quality}));
+      const json& d = parts.document;
+      for (const json& view : d["bufferViews"]) {
+        EXPECT_EQ(view["byteOffset"].get<std::size_t>() % 4, 0u);  // all components fit into it
+        EXPECT_LE(view["byteOffset"].get<std::size_t>() + view["byteLength"].get<std::size_t>(), parts.binary.size());
+      }
+      for (const json& accessor : d["accessors"]) {
+        const std::size_t component = accessor["componentType"] == 5123 ? 2 : 4;
+        const std::size_t components = accessor["type"] == "VEC3" ? 3 : accessor["type"] == "VEC2" ? 2 : 1;
+        EXPECT_EQ(d["bufferViews"].at(accessor["bufferView"].get<std::size_t>())["byteLength"],
+                  accessor["count"].get<std::size_t>() * component * components);
+      }
+      EXPECT_EQ(d["textures"].size(), d["images"].size());
+      for (const json& texture : d["textures"]) {
+        EXPECT_LT(texture["sampler"].get<std::size_t>(), d["samplers"].size());
+        const json& image = d["images"].at(texture["source"].get<std::size_t>());
+        const json& view = d["bufferViews"].at(image["bufferView"].get<std::size_t>());
+        const bool png = parts.binary.substr(view["byteOffset"].get<std::size_t>(), 4) == "\x89PNG";
+        EXPECT_EQ(image["mimeType"], png ? "image/png" : "image/jpeg");
+        EXPECT_EQ(png, quality == 0 && &texture != &d["textures"][0]);  // the texture itself is a JPEG here
+      }
+    }
+}
+
 TEST(LightFieldGlb, LeavesOutVerticesThatNobodyUsesAndTheirMaps) {
   for (const bool slots : {false, true}) {
     slf::LightField field = made_up(slots);
