@@ -9,13 +9,12 @@
 #include <cmath>
 #include <utility>
 
-#include "color.h"
+#include "texel_fit.h"
 #include "view_system.h"
 
 namespace lumihull::slf {
 namespace {
 
-constexpr std::size_t kBlocksAtOnce = 32, kVerticesAtOnce = 64;
 constexpr float kTowardsNodes = 0.05f;  // pulls a photograph's view maps to what the nodes say, in shares of the weight
 
 /// Polynomials of a direction, degree 1 to 3: smooth functions to start from.
@@ -63,15 +62,19 @@ JointFactors JointFit::run(Job& job) {
   job.begin("factors", steps);
   if (terms_) start();
   for (int i = 0; terms_ && i < options_.iterations; ++i) {
-    fit_surface(job, false);
+    fit_surface(job);
     normalise();
     fit_views(job);
     fit_nodes(job);
+    if (i + 1 == options_.iterations) cross_validate(job);
     evaluate_nodes(job);
     job.advance();
   }
-  fit_surface(job, true);
-  if (terms_) normalise();
+  fit_surface(job);
+  if (terms_) {
+    shrink();
+    normalise();
+  }
   job.advance();
   job.end();
   return std::move(factors_);
@@ -99,105 +102,57 @@ void JointFit::start() {
                   {&factors_.view[(v * nodes_.size() + i) * terms_], terms_});
 }
 
+void JointFit::interpolate(const std::vector<float>& views, const Texel& texel, float* out) const {
+  const auto& t = mesh_.triangles[texel.triangle];
+  const float *a0 = &views[t[0] * terms_], *a1 = &views[t[1] * terms_], *a2 = &views[t[2] * terms_];
+  const float b0 = 1 - texel.b1 - texel.b2;
+  for (std::size_t k = 0; k < terms_; ++k) out[k] = b0 * a0[k] + texel.b1 * a1[k] + texel.b2 * a2[k];
+}
+
 /// View maps at the photographs from the values at the nodes.
 void JointFit::evaluate_nodes(Job& job) {
   parallel_for(job, photos_.size(), [&](std::size_t p) {
-    for (std::size_t v = 0; v < vertices_; ++v) {
-      float* out = view_at(p, v);
-      std::fill_n(out, terms_, 0.0f);
-      const NodeWeights& w = weights_[p][v];
-      for (int i = 0; i < kNodesBlended; ++i) {
-        if (w.weight[i] == 0) continue;
-        const float* at = &factors_.view[(v * nodes_.size() + w.node[i]) * terms_];
-        for (std::size_t k = 0; k < terms_; ++k) out[k] += w.weight[i] * at[k];
-      }
-    }
+    for (std::size_t v = 0; v < vertices_; ++v)
+      blend_nodes(weights_[p][v], {&factors_.view[v * nodes_.size() * terms_], nodes_.size() * terms_},
+                  {view_at(p, v), terms_});
   });
 }
 
-/// Mean colour and surface maps of every texel: ridge regression on the view maps, exact.
-void JointFit::fit_surface(Job& job, bool with_rms) {
-  const std::size_t n = terms_ + 1, triangle_size = n * (n + 1) / 2;
+void JointFit::add_samples(TexelFit& fit, std::size_t block, std::size_t p) const {
+  if (photos_[p].first[block] == kUnseen) return;
+  const SurfaceSample8* samples = &photos_[p].samples[photos_[p].first[block]];
+  std::array<float, kMaxStartTerms> view;
+  const std::uint32_t begin = atlas_.blocks[block], end = atlas_.blocks[block + 1];
+  for (std::uint32_t texel = begin; texel < end; ++texel, ++samples) {
+    const float w = samples->weight();
+    if (w == 0) continue;
+    if (terms_) interpolate(views_[p], atlas_.texels[texel], view.data());
+    fit.add(texel - begin, w, color_of(*samples), {view.data(), terms_});
+  }
+}
+
+/// Mean colour and surface maps of every texel.
+void JointFit::fit_surface(Job& job) {
   struct Sums {
     double with = 0, mean = 0, weight = 0;
   };
   const std::size_t chunks = (blocks_ + kBlocksAtOnce - 1) / kBlocksAtOnce;
   std::vector<Sums> sums(chunks);
   parallel_for(job, chunks, [&](std::size_t chunk) {
-    std::vector<float> normal, right, squares, phi(n);
-    Eigen::MatrixXf system(n, n);
-    Eigen::MatrixXf colors(n, 3);
+    TexelFit fit(terms_, options_.surface_ridge);
     for (std::size_t b = chunk * kBlocksAtOnce; b < std::min(blocks_, (chunk + 1) * kBlocksAtOnce); ++b) {
-      const std::uint32_t begin = atlas_.blocks[b], count = atlas_.blocks[b + 1] - begin;
-      normal.assign(count * triangle_size, 0);
-      right.assign(count * n * 3, 0);
-      squares.assign(count, 0);
-      for (std::size_t p = 0; p < photos_.size(); ++p) {
-        if (photos_[p].first[b] == kUnseen) continue;
-        const SurfaceSample8* samples = &photos_[p].samples[photos_[p].first[b]];
-        for (std::uint32_t i = 0; i < count; ++i) {
-          const float w = samples[i].weight();
-          if (w == 0) continue;
-          const Texel& texel = atlas_.texels[begin + i];
-          const auto& t = mesh_.triangles[texel.triangle];
-          phi[0] = 1;
-          if (terms_) {
-            const float *a0 = view_at(p, t[0]), *a1 = view_at(p, t[1]), *a2 = view_at(p, t[2]);
-            const float b0 = 1 - texel.b1 - texel.b2;
-            for (std::size_t k = 0; k < terms_; ++k) phi[k + 1] = b0 * a0[k] + texel.b1 * a1[k] + texel.b2 * a2[k];
-          }
-          const std::array<float, 3> c{unit_of_srgb8(samples[i].r), unit_of_srgb8(samples[i].g),
-                                       unit_of_srgb8(samples[i].b)};
-          float* at = &normal[i * triangle_size];
-          float* rhs = &right[i * n * 3];
-          for (std::size_t k = 0; k < n; ++k) {
-            const float wk = w * phi[k];
-            for (std::size_t l = 0; l <= k; ++l) *at++ += wk * phi[l];
-            for (std::size_t ch = 0; ch < 3; ++ch) *rhs++ += wk * c[ch];
-          }
-          squares[i] += w * (c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
-        }
-      }
-      for (std::uint32_t i = 0; i < count; ++i) {
-        const float* at = &normal[i * triangle_size];
-        const float weight = at[0];
-        const std::size_t texel = begin + i;
-        factors_.seen[texel] = weight;
-        if (weight == 0) {
-          std::fill_n(&factors_.mean[texel * 3], 3, 0.0f);
-          std::fill_n(factors_.surface.begin() + std::ptrdiff_t(texel * terms_ * 3), terms_ * 3, 0.0f);
-          continue;
-        }
-        for (std::size_t k = 0; k < n; ++k)
-          for (std::size_t l = 0; l <= k; ++l) system(std::ptrdiff_t(k), std::ptrdiff_t(l)) = *at++;
-        const float ridge = float(options_.surface_ridge) * weight;
-        for (std::size_t k = 1; k < n; ++k) system(std::ptrdiff_t(k), std::ptrdiff_t(k)) += ridge;
-        for (std::size_t k = 0; k < n; ++k)
-          for (std::size_t ch = 0; ch < 3; ++ch)
-            colors(std::ptrdiff_t(k), std::ptrdiff_t(ch)) = right[(i * n + k) * 3 + ch];
-        const Eigen::MatrixXf rhs = colors;
-        system.selfadjointView<Eigen::Lower>().llt().solveInPlace(colors);
-        for (std::size_t ch = 0; ch < 3; ++ch) {
-          factors_.mean[texel * 3 + ch] = colors(0, std::ptrdiff_t(ch));
-          for (std::size_t k = 0; k < terms_; ++k)
-            factors_.surface[(texel * terms_ + k) * 3 + ch] = colors(std::ptrdiff_t(k + 1), std::ptrdiff_t(ch));
-        }
-        if (with_rms) {
-          // |c - φx|² = |c|² - 2 x·r + x·N x, with (N + ridge) x = r.
-          double left = squares[i];
-          for (std::size_t ch = 0; ch < 3; ++ch) {
-            const auto x = colors.col(std::ptrdiff_t(ch));
-            left -= double(x.dot(rhs.col(std::ptrdiff_t(ch)))) +
-                    double(ridge) * x.tail(std::ptrdiff_t(terms_)).squaredNorm();
-          }
-          sums[chunk].with += std::max(0.0, left);
-          sums[chunk].mean += std::max(0.0, double(squares[i]) - double(rhs.row(0).squaredNorm()) / weight);
-          sums[chunk].weight += 3.0 * weight;
-        }
+      const std::uint32_t begin = atlas_.blocks[b], end = atlas_.blocks[b + 1];
+      fit.clear(end - begin);
+      for (std::size_t p = 0; p < photos_.size(); ++p) add_samples(fit, b, p);
+      for (std::size_t texel = begin; texel < end; ++texel) {
+        factors_.seen[texel] = fit.weight(texel - begin);
+        fit.solve(texel - begin, &factors_.mean[texel * 3], factors_.surface.data() + texel * terms_ * 3);
+        sums[chunk].with += fit.left();
+        sums[chunk].mean += fit.left_by_mean();
+        sums[chunk].weight += 3.0 * double(fit.weight(texel - begin));
       }
     }
   });
-  if (!with_rms) return;
   Sums all;
   for (const Sums& s : sums) all.with += s.with, all.mean += s.mean, all.weight += s.weight;
   rms = all.weight > 0 ? std::sqrt(all.with / all.weight) : 0;
@@ -220,8 +175,8 @@ void JointFit::fit_view(std::size_t p) {
       if (w == 0) continue;
       const float* g = &factors_.surface[std::size_t(texel) * terms_ * 3];
       const float* mean = &factors_.mean[std::size_t(texel) * 3];
-      const std::array<float, 3> r{w * (unit_of_srgb8(samples->r) - mean[0]), w * (unit_of_srgb8(samples->g) - mean[1]),
-                                   w * (unit_of_srgb8(samples->b) - mean[2])};
+      const std::array<float, 3> c = color_of(*samples),
+                                 r{w * (c[0] - mean[0]), w * (c[1] - mean[1]), w * (c[2] - mean[2])};
       float* at = gram.data();
       for (std::size_t k = 0; k < terms_; ++k) {
         const float *gk = g + 3 * k, wk[3] = {w * gk[0], w * gk[1], w * gk[2]};
@@ -242,13 +197,29 @@ void JointFit::fit_nodes(Job& job) {
   const std::size_t size = nodes_.size() * terms_;
   parallel_chunks(job, vertices_, kVerticesAtOnce, [&](std::size_t first, std::size_t last) {
     NodeRegression regression(laplacian_, options_.view_smoothness, terms_);
-    for (std::size_t v = first; v < last; ++v) {
-      regression.clear();
-      for (std::size_t p = 0; p < photos_.size(); ++p)
-        if (trust_[p][v] > 0) regression.add(weights_[p][v], trust_[p][v], {view_at(p, v), terms_});
-      regression.solve({&factors_.view[v * size], size});
-    }
+    for (std::size_t v = first; v < last; ++v) regress(v, regression, kNoFold, {&factors_.view[v * size], size});
   });
+}
+
+/// One vertex's values at the nodes, from all photographs but those of one fold. Their mean is taken away from the
+/// photographs' values: it is the mean colour's part, so that this stays the mean where terms are left out and where no
+/// photograph looks.
+void JointFit::regress(std::size_t v, NodeRegression& regression, std::size_t left_out, std::span<float> out) const {
+  std::array<float, kMaxStartTerms> mean{}, value{};
+  float weight = 0;
+  for (std::size_t p = 0; p < photos_.size(); ++p) {
+    if (!(trust_[p][v] > 0) || p % kFolds == left_out) continue;
+    weight += trust_[p][v];
+    for (std::size_t k = 0; k < terms_; ++k) mean[k] += trust_[p][v] * views_[p][v * terms_ + k];
+  }
+  for (float& m : mean) m = weight > 0 ? m / weight : 0;
+  regression.clear();
+  for (std::size_t p = 0; p < photos_.size(); ++p) {
+    if (!(trust_[p][v] > 0) || p % kFolds == left_out) continue;
+    for (std::size_t k = 0; k < terms_; ++k) value[k] = views_[p][v * terms_ + k] - mean[k];
+    regression.add(weights_[p][v], trust_[p][v], {value.data(), terms_});
+  }
+  regression.solve(out);
 }
 
 /// View maps and surface maps are only known up to an invertible matrix: G H = (G M⁻¹)(M H). It is chosen so that view

@@ -4,6 +4,7 @@
 #include <lumihull/hull/mesh.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -11,6 +12,7 @@
 
 #include "atlas.h"
 #include "surface_samples.h"
+#include "texel_fit.h"
 #include "view_nodes.h"
 
 namespace lumihull::slf {
@@ -42,17 +44,33 @@ class JointFit {
 
   JointFactors run(Job& job);
 
+  /// How many terms, the first ones, hold at photographs that had no part in them; the others are zero.
+  std::size_t kept() const {
+    return std::size_t(std::count_if(share_.begin(), share_.end(), [](float s) { return s > 0; }));
+  }
+
   /// Root mean squares of the samples' weighted residuals: with the factors, and with the mean colour alone.
   double rms = 0, rms_of_mean = 0;
 
  private:
+  static constexpr std::size_t kFolds = 4;  // photographs p, p + 4, … are left out together
+  static constexpr std::size_t kNoFold = kFolds;
+  static constexpr std::size_t kBlocksAtOnce = 32, kVerticesAtOnce = 64;
+
   void start();
   void evaluate_nodes(Job& job);
-  void fit_surface(Job& job, bool with_rms);
+  void add_samples(TexelFit& fit, std::size_t block, std::size_t photo) const;
+  void fit_surface(Job& job);
   void fit_views(Job& job);
   void fit_nodes(Job& job);
+  void regress(std::size_t vertex, NodeRegression& regression, std::size_t left_out, std::span<float> out) const;
   void normalise();
   void fit_view(std::size_t photo);
+  void cross_validate(Job& job);
+  void shrink();
+
+  /// Values of all terms at a texel from those at the vertices of the mesh (vertices x terms).
+  void interpolate(const std::vector<float>& views, const Texel& texel, float* out) const;
 
   float* view_at(std::size_t photo, std::size_t vertex) { return &views_[photo][vertex * terms_]; }
 
@@ -69,6 +87,7 @@ class JointFit {
   std::vector<std::vector<NodeWeights>> weights_;       // photographs x vertices
   std::vector<std::vector<float>> views_;               // photographs x vertices x terms: view maps at the photographs
   std::vector<std::vector<float>> trust_;               // photographs x vertices: the weight behind them
+  std::vector<float> share_;                            // of each term, see cross_validate
   JointFactors factors_;
 };
 

@@ -137,6 +137,7 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
 
   if (joint) {
     field.terms = terms_of(factors, atlas, mesh.vertices.size(), field.nodes.size(), std::size_t(options.terms));
+    field.terms.resize(fit.kept());
   } else if (rings_apart) {
     Rings rings = make_rings(mesh, atlas, std::move(slot));
     const RingFitOptions ring_options{non_negative, options.terms, options.view_smoothness};

@@ -237,12 +237,9 @@ class RingFit {
   /// View maps of all vertices for one eye: vertices x terms.
   std::vector<float> view_at(const std::vector<float>& nodes, const Eigen::Vector3f& eye) const {
     std::vector<float> out(mesh_.vertices.size() * terms_, 0);
-    for (std::size_t v = 0; v < mesh_.vertices.size(); ++v) {
-      const NodeWeights w = node_weights(nodes_, mesh_.vertices[v], eye);
-      for (std::size_t i = 0; i < kNodesBlended; ++i)
-        for (std::size_t k = 0; k < terms_; ++k)
-          out[v * terms_ + k] += w.weight[i] * nodes[(v * nodes_.size() + w.node[i]) * terms_ + k];
-    }
+    const std::size_t size = nodes_.size() * terms_;
+    for (std::size_t v = 0; v < mesh_.vertices.size(); ++v)
+      blend_nodes(node_weights(nodes_, mesh_.vertices[v], eye), {&nodes[v * size], size}, {&out[v * terms_], terms_});
     return out;
   }
 

@@ -3,10 +3,12 @@
 #include <lumihull/base/job.h>
 #include <lumihull/slf/photos.h>
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "atlas.h"
+#include "color.h"
 #include "prepared_photo.h"
 #include "surface_viewer.h"
 
@@ -22,6 +24,10 @@ struct SurfaceSample8 {
     return root * root;
   }
 };
+
+inline std::array<float, 3> color_of(const SurfaceSample8& s) {
+  return {unit_of_srgb8(s.r), unit_of_srgb8(s.g), unit_of_srgb8(s.b)};
+}
 
 /// The samples of one photograph, in whole blocks of the atlas; blocks that it doesn't see take no room.
 struct PhotoSamples {

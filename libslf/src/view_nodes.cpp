@@ -64,6 +64,15 @@ NodeWeights node_weights(std::span<const Eigen::Vector3f> nodes, const Eigen::Ve
   return out;
 }
 
+void blend_nodes(const NodeWeights& w, std::span<const float> values, std::span<float> out) {
+  std::fill(out.begin(), out.end(), 0.0f);
+  for (int i = 0; i < kNodesBlended; ++i) {
+    if (w.weight[i] == 0) continue;
+    const float* at = &values[w.node[i] * out.size()];
+    for (std::size_t k = 0; k < out.size(); ++k) out[k] += w.weight[i] * at[k];
+  }
+}
+
 std::vector<std::uint32_t> choose_nodes(std::span<const Eigen::Vector3f> places, const Eigen::Vector3f& center,
                                         std::size_t most) {
   const auto dirs = directions(places, center);

@@ -24,6 +24,9 @@ struct NodeWeights {
 NodeWeights node_weights(std::span<const Eigen::Vector3f> nodes, const Eigen::Vector3f& point,
                          const Eigen::Vector3f& eye);
 
+/// Σ weight · value: `values` at the nodes (nodes x terms), `out` of as many values as there are terms.
+void blend_nodes(const NodeWeights& weights, std::span<const float> values, std::span<float> out);
+
 /// At most `most` of the given places, spread evenly over the directions from `center`: the first, then always the one
 /// farthest from those taken. Places that differ by less than a tenth of a degree count as one. In ascending order.
 std::vector<std::uint32_t> choose_nodes(std::span<const Eigen::Vector3f> places, const Eigen::Vector3f& center,

@@ -10,6 +10,7 @@ namespace lumihull::slf {
 namespace {
 
 constexpr int kIterations = 12;
+constexpr float kNothing = 1e-20f;    // what counts less would leave the range of floats when it is divided by
 constexpr double kGoodEnough = 1e-6;  // squared residual, relative
 
 /// y += S x for a symmetric matrix given by its lower triangle.
@@ -73,6 +74,7 @@ std::vector<float> ViewSystem::trust() const {
   for (std::size_t v = 0; v < out.size(); ++v) {
     std::size_t at = v * packed_;
     for (std::size_t k = 0; k < terms_; ++k, at += k + 1) out[v] += diagonal_[at] / float(terms_);
+    if (out[v] < kNothing) out[v] = 0;
   }
   return out;
 }

@@ -70,7 +70,8 @@ enum class Factorization {
 
 struct LightFieldOptions {
   Factorization method = Factorization::joint;
-  int terms = 6;        ///< products beyond the mean colour (nmf: in all), 0 … kMaxTerms
+  int terms = 6;  ///< products beyond the mean colour (nmf: in all), 0 … kMaxTerms; joint: those that do not hold
+                  ///< at photographs which had no part in them are left out
   int max_nodes = 96;   ///< places where view maps have values: photographs' places, as many of them at most; 4 … 255
   int max_side = 2048;  ///< largest width and height of the maps, 64 … 16384
   double texel_px = 0.5;  ///< size of a texel in pixels of the photographs, at the median over the surface
