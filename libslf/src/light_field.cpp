@@ -1,4 +1,5 @@
 #include <lumihull/base/error.h>
+#include <lumihull/base/parallel.h>
 #include <lumihull/slf/camera_path.h>
 #include <lumihull/slf/light_field.h>
 
@@ -9,6 +10,7 @@
 
 #include "atlas.h"
 #include "color.h"
+#include "exposure.h"
 #include "joint_fit.h"
 #include "light_field_terms.h"
 #include "photo_options.h"
@@ -117,6 +119,12 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
                               {edge_options(options), float(options.min_cosine), ordinary_pixel(mesh, photos)}, job);
   }
 
+  std::vector<Eigen::Vector3f> gains;
+  if (options.even_exposure) {
+    gains = exposure_gains(atlas, samples, job);
+    parallel_for(job, samples.size(), [&](std::size_t i) { divide_by_gain(samples[i], gains[i]); });
+  }
+
   LightField field;
   field.base.mesh = mesh;
   field.up = up_axis(photos.views).cast<float>();
@@ -151,6 +159,7 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
     report->unseen_share = double(filled) / double(std::max<std::size_t>(1, atlas.texels.size()));
     report->samples = 0;
     for (const PhotoSamples& p : samples) report->samples += p.samples.size();
+    report->gains = std::move(gains);
     report->rms = rms;
     report->rms_of_mean = fit.rms_of_mean;
   }

@@ -1,8 +1,10 @@
 #include <lumihull/base/error.h>
+#include <lumihull/calib/despill.h>
 #include <lumihull/slf/photos.h>
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 
 namespace lumihull::slf {
 namespace {
@@ -54,6 +56,17 @@ PhotoSet photos_of(const Capture& capture, std::span<const std::size_t> shots) {
     if (photo.rgb.type() != PixelType::u8) photo.rgb = converted(photo.rgb, PixelType::u8, 3);
     const bool masked = source->mask_state(source->shots[shot]) != MaskSource::none;
     photo.alpha = masked ? source->read_mask(shot) : opaque(photo.rgb.width(), photo.rgb.height());
+    return photo;
+  };
+  return photos;
+}
+
+PhotoSet despilled(PhotoSet photos, const calib::Despill& despill, float strength) {
+  if (!(strength >= 0 && strength <= 1))
+    throw Error(ErrorCode::invalid_argument, "strength: expected 0 to 1", "despill");
+  photos.read = [read = std::move(photos.read), despill, strength](std::size_t i) {
+    Photo photo = read(i);
+    despill.apply(photo.rgb, calib::SpillMode::limit, strength);
     return photo;
   };
   return photos;

@@ -1,3 +1,4 @@
+#include <lumihull/calib/despill.h>
 #include <lumihull/slf/light_field.h>
 #include <lumihull/slf/light_field_glb.h>
 #include <lumihull/slf/metrics.h>
@@ -31,12 +32,12 @@ slf::PhotoSet photographs_of(const hull::Mesh& mesh, const ViewPaint& paint, con
 }
 
 /// A ball of bands with a broad white gloss from one lamp.
-ViewPaint glossy() {
-  return [bands = test::bands()](const Eigen::Vector3f& p, const Eigen::Vector3f& eye) -> Eigen::Vector3f {
+ViewPaint glossy(float exponent = 5) {
+  return [bands = test::bands(), exponent](const Eigen::Vector3f& p, const Eigen::Vector3f& eye) -> Eigen::Vector3f {
     const Eigen::Vector3f n = p.normalized(), v = (eye - p).normalized();
     const Eigen::Vector3f mirrored = 2 * n.dot(v) * n - v;
     const float c = std::max(0.0f, mirrored.dot(Eigen::Vector3f(1, 0.5f, 0.8f).normalized()));
-    return 0.7f * bands(p) + Eigen::Vector3f::Constant(70 * std::pow(c, 5.0f));
+    return 0.7f * bands(p) + Eigen::Vector3f::Constant(70 * std::pow(c, exponent));
   };
 }
 
@@ -125,6 +126,84 @@ TEST(LightField, LosesNothingOnAMattObject) {
   const slf::LightField field = slf::fit_light_field(mesh, seen, {}, job);
   // Beyond 50 dB it is the bytes' rounding that differs.
   EXPECT_GT(mean_psnr(field, fresh), std::min(50.0, mean_psnr(slf::mean_texture(mesh, seen, {}, job), fresh) - 0.05));
+}
+
+TEST(LightField, LeavesOutTermsThatWouldOnlyHoldNoise) {
+  const hull::Mesh mesh = test::sphere(40);
+  const std::vector<View> few = test::around(12, 3, 4, test::camera(120, 100, 110));
+  const slf::PhotoSet fresh = test::photographs(mesh, test::bands(), new_views());
+  const slf::PhotoSet seen = test::photographs(mesh, test::bands(), few);
+  Job job;
+  const slf::LightField field = slf::fit_light_field(mesh, seen, {}, job);
+  EXPECT_LE(field.terms.size(), 1u);
+  EXPECT_GT(mean_psnr(field, fresh), std::min(50.0, mean_psnr(slf::mean_texture(mesh, seen, {}, job), fresh) - 0.05));
+  // ... and no others.
+  EXPECT_GE(slf::fit_light_field(mesh, photographs_of(mesh, glossy(), few), {.terms = 3}, job).terms.size(), 3u);
+}
+
+/// Photographs as a camera takes them whose exposure and white balance change, in linear light.
+slf::PhotoSet exposed(slf::PhotoSet photos, const std::vector<Eigen::Vector3f>& gains) {
+  photos.read = [read = photos.read, gains](std::size_t i) {
+    slf::Photo photo = read(i);
+    for (int y = 0; y < photo.rgb.height(); ++y)
+      for (int x = 0; x < 3 * photo.rgb.width(); ++x) {
+        std::uint8_t& byte = photo.rgb.row<std::uint8_t>(y)[x];
+        const float light = linear_from_srgb(float(byte) / 255) * gains[i][x % 3];
+        byte = std::uint8_t(std::lround(255 * srgb_from_linear(std::min(1.0f, light))));
+      }
+    return photo;
+  };
+  return photos;
+}
+
+TEST(LightField, EvensOutExposureAndWhiteBalance) {
+  const hull::Mesh mesh = test::sphere(40);
+  const std::vector<View> views = test::around(10, 3, 4, test::camera(120, 100, 110));
+  std::vector<Eigen::Vector3f> gains;
+  Eigen::Vector3f product(1, 1, 1);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const auto a = float(i);
+    gains.emplace_back(1 + 0.25f * std::sin(a), 1 + 0.2f * std::cos(2 * a), 1 + 0.3f * std::sin(3 * a));
+    product = product.cwiseProduct(gains.back());
+  }
+  const Eigen::Vector3f mean = product.array().pow(1 / float(views.size()));
+  for (const bool gloss : {false, true}) {
+    const slf::PhotoSet even =
+        gloss ? photographs_of(mesh, glossy(80), views) : test::photographs(mesh, test::bands(), views);
+    Job job;
+    slf::LightFieldReport plain, evened, untouched;
+    slf::fit_light_field(mesh, exposed(even, gains), {.terms = 0, .edge_alpha = test::kNoTrace}, job, &plain);
+    EXPECT_TRUE(plain.gains.empty());
+    slf::fit_light_field(mesh, exposed(even, gains), {.terms = 0, .even_exposure = true, .edge_alpha = test::kNoTrace},
+                         job, &evened);
+    slf::fit_light_field(mesh, even, {.terms = 0, .even_exposure = true, .edge_alpha = test::kNoTrace}, job,
+                         &untouched);
+    ASSERT_EQ(evened.gains.size(), views.size());
+    for (std::size_t i = 0; i < views.size(); ++i)
+      for (int c = 0; c < 3; ++c) {
+        EXPECT_NEAR(evened.gains[i][c] * mean[c] / gains[i][c], 1, gloss ? 0.04 : 0.01) << i << ' ' << c;
+        EXPECT_NEAR(untouched.gains[i][c], 1, gloss ? 0.04 : 0.01) << i << ' ' << c;
+      }
+    EXPECT_LT(evened.rms_of_mean, 0.6 * plain.rms_of_mean);
+    if (!gloss) {
+      EXPECT_LT(evened.rms_of_mean, 0.008);
+    }
+  }
+}
+
+TEST(LightField, PhotographsCanBeDespilled) {
+  const calib::ColorCount green{{0, 220, 0}, 1};
+  const calib::Despill despill({&green, 1});
+  const hull::Mesh mesh = test::sphere(16);
+  const auto views = test::around(4, 1, 4, test::camera(40, 40, 40));
+  const slf::PhotoSet photos = slf::despilled(test::photographs(mesh, test::plain(100, 160, 80), views), despill, 1);
+  const slf::Photo before = test::photographs(mesh, test::plain(100, 160, 80), views).read(0), after = photos.read(0);
+  const std::uint8_t* middle = after.rgb.row<std::uint8_t>(20) + 3 * 20;
+  EXPECT_EQ(before.rgb.row<std::uint8_t>(20)[3 * 20 + 1], 160);
+  EXPECT_NEAR(middle[0], 100, 1);
+  EXPECT_NEAR(middle[1], 90, 1);  // G' = min(G, (R + B) / 2)
+  EXPECT_NEAR(middle[2], 80, 1);
+  EXPECT_EQ(test::expect_error([&] { slf::despilled(photos, despill, 1.5f); }).code(), ErrorCode::invalid_argument);
 }
 
 TEST(LightField, RecoversFactorsOfKnownRankAndOrdersThemByEnergy) {

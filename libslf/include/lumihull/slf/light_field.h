@@ -80,6 +80,7 @@ struct LightFieldOptions {
       0.05;  ///< joint: pulls surface maps towards 0 where photographs say little, in shares of their weight
   double view_smoothness = 0.02;  ///< pulls neighbouring nodes' values together, in shares of the photographs' weight
   double min_cosine = 0.15;       ///< flatter views count next to nothing, 0 … 1
+  bool even_exposure = false;     ///< evens out exposure and white balance between the photographs
   double visibility_offset =
       0.003;              ///< how far beside the surface a shadow starts to count, in diagonals of the mesh's box
   double erosion_px = 0;  ///< rim of the photographs' silhouettes that counts next to nothing, px
@@ -93,8 +94,10 @@ struct LightFieldReport {
   double texel_size = 0;      ///< world units
   double unseen_share = 0;    ///< share of the surface texels that no photograph saw
   std::uint64_t samples = 0;  ///< texels x photographs that see them
-  double rms = 0;             ///< of what is left of the samples' colours, sRGB values 0 … 1
-  double rms_of_mean = 0;     ///< the same where only the mean colour is used
+  std::vector<Eigen::Vector3f>
+      gains;               ///< even_exposure: of each photograph, linear light, RGB; their geometric mean is 1
+  double rms = 0;          ///< of what is left of the samples' colours, sRGB values 0 … 1
+  double rms_of_mean = 0;  ///< the same where only the mean colour is used
 };
 
 /// Factors the photographs' appearance on a mesh. Errors: invalid_argument (options), bad_input (mesh, views),

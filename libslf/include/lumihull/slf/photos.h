@@ -11,6 +11,10 @@
 #include <string>
 #include <vector>
 
+namespace lumihull::calib {
+class Despill;
+}
+
 namespace lumihull::slf {
 
 /// A photograph together with its silhouette.
@@ -41,5 +45,9 @@ LUMIHULL_API std::vector<std::size_t> held_out_shots(const Capture& capture);
 /// Photographs and masks of some shots of a capture (which is copied). A shot without a mask counts as wholly object.
 /// Reading throws what Capture::read_photo and read_mask throw.
 LUMIHULL_API PhotoSet photos_of(const Capture& capture, std::span<const std::size_t> shots);
+
+/// The same photographs with the enclosure's light taken off (SpillMode::limit). What the object itself has of the
+/// enclosure's hue goes, too. strength: 0 … 1. Errors: invalid_argument.
+LUMIHULL_API PhotoSet despilled(PhotoSet photos, const calib::Despill& despill, float strength);
 
 }  // namespace lumihull::slf
