@@ -18,10 +18,10 @@ float quantile(std::vector<float>& values, double share) {
 
 }  // namespace
 
-ByteScale signed_range_of(std::vector<float> values) {
+ByteScale signed_range_of(std::vector<float> values, float least_step) {
   if (values.empty()) return {};
   for (float& v : values) v = std::abs(v);
-  const float most = std::max(quantile(values, 1 - kClipped), kLeast);
+  const float most = std::max({quantile(values, 1 - kClipped), kLeast, 127 * least_step});
   // 128 stands for zero.
   return {2 * most * 255 / 254, -2 * most * 128 / 254};
 }

@@ -7,8 +7,9 @@
 
 namespace lumihull::slf {
 
-/// The range that holds all values but a few outliers, around zero so that a byte stands for zero exactly.
-ByteScale signed_range_of(std::vector<float> values);
+/// The range that holds all values but a few outliers, around zero so that a byte stands for zero exactly. least_step:
+/// what bytes are apart at least, so that those which say no more than that pack well.
+ByteScale signed_range_of(std::vector<float> values, float least_step = 0);
 
 /// The range from zero (byte 0) that holds all values, which must be >= 0, but a share `clipped` of the largest.
 ByteScale positive_range_of(std::vector<float> values, double clipped);

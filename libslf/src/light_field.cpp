@@ -144,7 +144,7 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
     for (auto& uv : corners) uv = uv.cwiseQuotient(size).cwiseMax(0.0f).cwiseMin(1.0f);
 
   if (joint) {
-    field.terms = terms_of(factors, atlas, mesh.vertices.size(), field.nodes.size(), std::size_t(options.terms));
+    field.terms = terms_of(factors, atlas, mesh.vertices.size(), field.nodes.size(), std::size_t(options.terms), rms);
     field.terms.resize(fit.kept());
   } else if (rings_apart) {
     Rings rings = make_rings(mesh, atlas, std::move(slot));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 #include "byte_scale.h"
@@ -11,6 +12,8 @@
 namespace lumihull::slf {
 namespace {
 
+constexpr double kRounding =
+    0.15;  // of view maps to bytes: what a term may err by it, in shares of what the fit leaves
 constexpr double kClippedViews = 1e-4;  // share of the non-negative view maps' values that bytes leave out
 
 using Bytes = std::array<std::uint8_t, 3>;
@@ -19,11 +22,11 @@ BlendColor as_color(const Bytes& b) { return {unit_of_srgb8(b[0]), unit_of_srgb8
 
 /// Term `k` of view maps (vertices x nodes x terms), node by node.
 void set_view(const std::vector<float>& view, std::size_t vertices, std::size_t nodes, std::size_t terms, std::size_t k,
-              bool non_negative, LightFieldTerm& term) {
+              bool non_negative, float least_step, LightFieldTerm& term) {
   std::vector<float> values(vertices * nodes);
   for (std::size_t v = 0; v < vertices; ++v)
     for (std::size_t i = 0; i < nodes; ++i) values[i * vertices + v] = view[(v * nodes + i) * terms + k];
-  term.view_scale = non_negative ? positive_range_of(values, kClippedViews) : signed_range_of(values);
+  term.view_scale = non_negative ? positive_range_of(values, kClippedViews) : signed_range_of(values, least_step);
   term.view.resize(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) term.view[i] = to_byte(values[i], term.view_scale);
 }
@@ -38,7 +41,7 @@ std::vector<float> surface_of(const std::vector<float>& surface, std::size_t ter
 }  // namespace
 
 std::vector<LightFieldTerm> terms_of(const JointFactors& factors, const Atlas& atlas, std::size_t vertices,
-                                     std::size_t nodes, std::size_t terms) {
+                                     std::size_t nodes, std::size_t terms, double rms) {
   std::vector<LightFieldTerm> out(terms);
   std::vector<BlendColor> texels(atlas.texels.size());
   for (std::size_t k = 0; k < terms; ++k) {
@@ -48,7 +51,12 @@ std::vector<LightFieldTerm> terms_of(const JointFactors& factors, const Atlas& a
       texels[i] = as_color(
           {to_byte(values[3 * i], scale), to_byte(values[3 * i + 1], scale), to_byte(values[3 * i + 2], scale)});
     out[k].surface.push_back(texture_picture(atlas, texels));
-    set_view(factors.view, vertices, nodes, terms, k, false, out[k]);
+    // Uniform rounding errs by step / √12, which the surface map multiplies.
+    double square = 0;
+    for (const float g : values) square += double(g) * g;
+    const double size = std::sqrt(square / double(std::max<std::size_t>(1, values.size())));
+    const double step = size > 0 ? kRounding * rms * std::sqrt(12.0) / size : 0;
+    set_view(factors.view, vertices, nodes, terms, k, false, float(step), out[k]);
   }
   return out;
 }
@@ -83,7 +91,7 @@ std::vector<LightFieldTerm> terms_of(const RingFactors& factors, const Atlas& at
       }
       out[k].surface.push_back(texture_picture(atlas, texels));
     }
-    set_view(factors.view, vertices, nodes, terms, k, options.non_negative, out[k]);
+    set_view(factors.view, vertices, nodes, terms, k, options.non_negative, 0, out[k]);
   }
   return out;
 }
