@@ -71,10 +71,7 @@ JointFactors JointFit::run(Job& job) {
     job.advance();
   }
   fit_surface(job);
-  if (terms_) {
-    shrink();
-    normalise();
-  }
+  if (terms_) normalise();
   job.advance();
   job.end();
   return std::move(factors_);
@@ -139,7 +136,7 @@ void JointFit::fit_surface(Job& job) {
   const std::size_t chunks = (blocks_ + kBlocksAtOnce - 1) / kBlocksAtOnce;
   std::vector<Sums> sums(chunks);
   parallel_for(job, chunks, [&](std::size_t chunk) {
-    TexelFit fit(terms_, options_.surface_ridge);
+    TexelFit fit(terms_, options_.surface_ridge, share_);
     for (std::size_t b = chunk * kBlocksAtOnce; b < std::min(blocks_, (chunk + 1) * kBlocksAtOnce); ++b) {
       const std::uint32_t begin = atlas_.blocks[b], end = atlas_.blocks[b + 1];
       fit.clear(end - begin);

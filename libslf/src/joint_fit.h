@@ -67,7 +67,6 @@ class JointFit {
   void normalise();
   void fit_view(std::size_t photo);
   void cross_validate(Job& job);
-  void shrink();
 
   /// Values of all terms at a texel from those at the vertices of the mesh (vertices x terms).
   void interpolate(const std::vector<float>& views, const Texel& texel, float* out) const;
@@ -87,7 +86,7 @@ class JointFit {
   std::vector<std::vector<NodeWeights>> weights_;       // photographs x vertices
   std::vector<std::vector<float>> views_;               // photographs x vertices x terms: view maps at the photographs
   std::vector<std::vector<float>> trust_;               // photographs x vertices: the weight behind them
-  std::vector<float> share_;                            // of each term, see cross_validate
+  std::vector<float> share_;                            // of each term, see cross_validate; empty before
   JointFactors factors_;
 };
 

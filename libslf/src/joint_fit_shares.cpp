@@ -88,8 +88,4 @@ void JointFit::cross_validate(Job& job) {
     share_.push_back(float(std::clamp((share - kNoiseShare) / (kSure - kNoiseShare), 0.0, 1.0)));
 }
 
-void JointFit::shrink() {
-  for (std::size_t i = 0; i < factors_.surface.size(); ++i) factors_.surface[i] *= share_[i / 3 % terms_];
-}
-
 }  // namespace lumihull::slf

@@ -12,8 +12,9 @@ namespace lumihull::slf {
 /// each texel by itself, exactly.
 class TexelFit {
  public:
-  /// ridge: pulls surface maps, not the mean, towards 0, in shares of a texel's weight.
-  TexelFit(std::size_t terms, double ridge);
+  /// ridge: pulls surface maps, not the mean, towards 0, in shares of a texel's weight. shares: what solve keeps of
+  /// each term, 0 … 1; empty: all.
+  TexelFit(std::size_t terms, double ridge, std::span<const float> shares = {});
 
   void clear(std::size_t texels);
 
@@ -45,6 +46,7 @@ class TexelFit {
  private:
   std::size_t n_, packed_;
   float ridge_;
+  Eigen::VectorXf shares_;  // of the mean and the terms
   double left_ = 0, left_by_mean_ = 0;
   std::vector<float> phi_, normal_, right_, squares_;
   Eigen::MatrixXf system_, rhs_, colors_;
