@@ -1,0 +1,55 @@
+#pragma once
+
+#include <lumihull/base/camera.h>
+#include <lumihull/base/image.h>
+#include <lumihull/base/pose.h>
+#include <lumihull/calib/target_set.h>
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace lumihull::rig {
+
+/// A disc or a polygon on a sheet; colours are linear reflectances, 0 … 1.
+struct FlatShape {
+  Eigen::Vector3f color{0, 0, 0};
+  Eigen::Vector2d center{0, 0};          ///< of a disc, m
+  double radius = 0;                     ///< > 0: a disc
+  std::vector<Eigen::Vector2d> polygon;  ///< simple; where there is no radius
+};
+
+/// A flat sheet with shapes that were printed on it one after another. Its frame: x right, y down, z into the paper.
+struct FlatPrint {
+  Eigen::Vector2d low{0, 0}, high{0, 0};  ///< the sheet, m
+  Eigen::Vector3f paper{.8f, .8f, .8f};
+  std::vector<FlatShape> shapes;
+  Pose world_from_print;
+};
+
+/// A target as printed, with a margin of paper around it (circles: half a pitch; squares: two modules), its frame that of
+/// TargetDesign.
+FlatPrint print_of(const calib::TargetDesign& design, int id);
+/// A field of points as printed; the frame is that of PointGrid.
+FlatPrint print_of(const calib::PointGrid& grid, const Eigen::Vector3f& ink, const Eigen::Vector3f& paper);
+
+/// What happens between the sheets and the file.
+struct PrintPhotoOptions {
+  int edge_samples = 16;      ///< samples x samples a pixel where edges pass: the share of a pixel that a colour covers
+  double blur_px = 0;         ///< sigma of a Gaussian, in linear light
+  double exposure = 1;        ///< factor on the light
+  Eigen::Vector2f shading{0, 0};  ///< change of the light across the picture's width and height, e.g. 0.5: half as much again
+  double noise_read = 0;      ///< standard deviation in linear light
+  double noise_shot = 0;      ///< variance = noise_shot · value on top
+  bool bayer = false;         ///< one colour a pixel (RGGB), demosaiced bilinearly
+  int jpeg_quality = 0;       ///< 1 … 100: through a JPEG and back; 0: none
+};
+
+/// Photographs sheets on an even background: nearest sheet first. Pixels integrate over their square; edges are right to
+/// 1 / edge_samples² of a pixel, through the lens's distortion. A function of its arguments, whatever the threads.
+/// linear: f32, 3 channels, linear light (not clipped); else 8-bit sRGB.
+Image photograph_prints(const View& view, std::span<const FlatPrint> prints, const Eigen::Vector3f& background,
+                        const PrintPhotoOptions& options, std::uint64_t seed, bool linear = false);
+
+}  // namespace lumihull::rig

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <lumihull/base/api.h>
+#include <lumihull/calib/light_plane.h>
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+
+namespace lumihull::calib {
+
+/// An ellipse in a picture: px, first pixel's centre (0.5, 0.5).
+struct LUMIHULL_API Ellipse {
+  Eigen::Vector2d center{0, 0};
+  double a = 0, b = 0;  ///< semi-axes, a >= b > 0
+  double angle = 0;     ///< of the longer axis, rad, from x towards y, in (-pi/2, pi/2]
+
+  /// Dual conic C* (3 x 3, symmetric, C*(2,2) = 1): l is a tangent exactly if lᵀ C* l = 0. Centre = (C*02, C*12).
+  Eigen::Matrix3d dual_conic() const;
+  /// nullopt where C* is no real ellipse.
+  static std::optional<Ellipse> from_dual_conic(const Eigen::Matrix3d& dual);
+  Eigen::Vector2d point(double t) const;  ///< center + a cos t (…) + b sin t (…)
+};
+
+enum class EllipseState : std::uint8_t {
+  good,
+  no_fit,     ///< the answer is no ellipse, or the iteration left its basin
+  at_border,  ///< the contour leaves the picture
+  occluded,   ///< part of the contour is hidden or disturbed: more than the options allow
+  saturated,  ///< too much of the contour's neighbourhood is clipped
+  no_contrast,
+};
+
+/// What was measured of one ellipse.
+struct EllipseFit {
+  EllipseState state = EllipseState::no_fit;
+  Ellipse ellipse;
+  /// Covariance of (center x, center y, and the dual conic's A, B, C as in docs of dual_conic_fit), by propagating the
+  /// pixels' noise through the estimator. The first 2 x 2 block is the centre's, px².
+  Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
+  double inside = 0, outside = 0;  ///< values of the plane on both sides of the contour
+  double blur_px = 0;              ///< sigma of the edge's profile
+  double residual = 0;             ///< RMS residual / expected noise: about 1 where the model holds
+  double visible = 1;              ///< part of the contour that was used
+
+  Eigen::Matrix2d center_covariance() const { return covariance.topLeftCorner<2, 2>(); }
+};
+
+struct LUMIHULL_API EllipseOptions {
+  double gradient_sigma_px = 1;   ///< of the derivative of a Gaussian, 0.5 … 5
+  double min_visible = 0.6;       ///< of the contour, 0 … 1
+  double max_saturated = 0.1;     ///< of the contour's neighbourhood, 0 … 1
+  double min_contrast_noise = 5;  ///< contrast over noise, below which nothing is measured
+
+  void validate() const;
+};
+
+/// Ouellet & Hébert's dual-conic operator (CRV 2007; Machine Vision and Applications 2009), as published: each pixel of a
+/// band around `guess` gives a tangent line l = (gx, gy, -(gx x + gy y)) by its gradient, and the dual conic F* = 1 is the
+/// linear least-squares answer of lᵀ C* l = 0, lines unnormalised so that strong gradients count. Coordinates are moved
+/// to the guess's centre and scaled. guess: within a few px.
+LUMIHULL_API EllipseFit dual_conic_fit(const LightPlane& plane, const Ellipse& guess,
+                                       const EllipseOptions& options = {});
+
+/// Maximum-likelihood fit of an ellipse with its edge profile (two levels, Gaussian blur, pixel integration) to all
+/// pixels near the contour, weighted by their noise; starts from the dual-conic fit. Reaches the Cramér-Rao bound for
+/// this model. Disturbed parts of the contour are found by their residuals and left out.
+LUMIHULL_API EllipseFit fit_ellipse(const LightPlane& plane, const Ellipse& guess, const EllipseOptions& options = {});
+
+}  // namespace lumihull::calib
