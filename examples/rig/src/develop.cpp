@@ -8,23 +8,13 @@
 #include <vector>
 
 #include "noise.h"
+#include "srgb_table.h"
 
 namespace lumihull::rig {
 
 namespace {
 
 constexpr std::size_t kRows = 16;  ///< rows in a chunk of work
-
-/// 8-bit sRGB of linear light in steps of 1/65535: below that, sRGB's slope (12.92 x 255 / 65535) is under a level.
-const std::vector<std::uint8_t>& srgb_table() {
-  static const std::vector<std::uint8_t> table = [] {
-    std::vector<std::uint8_t> t(65536);
-    for (std::size_t i = 0; i < t.size(); ++i)
-      t[i] = std::uint8_t(std::lround(255 * srgb_from_linear(float(i) / 65535.f)));
-    return t;
-  }();
-  return table;
-}
 
 /// Keys 1981, a = -1/2: weights of the samples at -1, 0, 1, 2 for a place t in [0, 1) behind sample 0.
 std::array<float, 4> cubic_weights(float t) {

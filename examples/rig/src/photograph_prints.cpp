@@ -1,0 +1,207 @@
+#include <lumihull/base/error.h>
+#include <lumihull/rig/flat_print.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "flat_coverage.h"
+#include "noise.h"
+#include "srgb_table.h"
+
+namespace lumihull::rig {
+
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3f;
+
+constexpr int kMaxSamples = 256;
+constexpr double kMaxBlur = 100;
+
+[[noreturn]] void refuse(const std::string& what, const std::string& subject) {
+  throw Error(ErrorCode::invalid_argument, what, subject);
+}
+
+void check(const PrintPhotoOptions& o) {
+  if (o.edge_samples < 1 || o.edge_samples > kMaxSamples) refuse("must be 1 to 256", "edge_samples");
+  if (!(o.blur_px >= 0 && o.blur_px <= kMaxBlur)) refuse("must be 0 to 100", "blur_px");
+  if (!(std::isfinite(o.exposure) && o.exposure >= 0)) refuse("must be finite, at least 0", "exposure");
+  if (!o.shading.allFinite()) refuse("must be finite", "shading");
+  if (!(std::isfinite(o.noise_read) && o.noise_read >= 0)) refuse("must be finite, at least 0", "noise_read");
+  if (!(std::isfinite(o.noise_shot) && o.noise_shot >= 0)) refuse("must be finite, at least 0", "noise_shot");
+  if (o.jpeg_quality < 0 || o.jpeg_quality > 100) refuse("must be 0 (no JPEG) to 100", "jpeg_quality");
+}
+
+void check(const FlatPrint& print, std::size_t i) {
+  const std::string name = "print " + std::to_string(i);
+  if (!(print.low.allFinite() && print.high.allFinite() && (print.high - print.low).minCoeff() > 0))
+    refuse("the sheet's high must be above its low", name);
+  if (!print.paper.allFinite()) refuse("paper is not finite", name);
+  if (!(print.world_from_print.rotation.coeffs().allFinite() && print.world_from_print.translation.allFinite()))
+    refuse("world_from_print is not finite", name);
+  for (const FlatShape& s : print.shapes) {
+    if (!s.color.allFinite()) refuse("a shape's colour is not finite", name);
+    if (s.radius > 0 ? !(s.center.allFinite() && std::isfinite(s.radius)) : s.polygon.size() < 3)
+      refuse("a shape is neither a disc with a finite centre nor a polygon of at least 3 points", name);
+    for (const Vector2d& p : s.polygon)
+      if (!p.allFinite()) refuse("a polygon's point is not finite", name);
+  }
+}
+
+/// How much smaller the pixels have to be for samples of a Gaussian to act as the Gaussian does: at sigma = .8 of them
+/// the spectrum's first replica is 3e-6 (exp(-2 pi² sigma²)).
+int magnification(double sigma) {
+  return sigma > 0 && sigma < .8 ? std::min(8, int(std::ceil(.8 / sigma))) : 1;
+}
+
+/// Separable; what lies beyond the border is as the border.
+void blur(Image& image, double sigma) {
+  const int reach = std::max(1, int(std::ceil(5 * sigma)));
+  std::vector<float> kernel(std::size_t(2 * reach + 1));
+  double sum = 0;
+  for (int i = -reach; i <= reach; ++i) sum += std::exp(-.5 * i * i / (sigma * sigma));
+  for (int i = -reach; i <= reach; ++i)
+    kernel[std::size_t(i + reach)] = float(std::exp(-.5 * i * i / (sigma * sigma)) / sum);
+
+  const int w = image.width(), h = image.height();
+  std::vector<float> padded(std::size_t(w + 2 * reach) * 3);
+  for (int y = 0; y < h; ++y) {
+    float* row = image.row<float>(y);
+    for (int x = -reach; x < w + reach; ++x)
+      std::copy_n(row + std::ptrdiff_t(3) * std::clamp(x, 0, w - 1), 3, &padded[std::size_t(x + reach) * 3]);
+    std::fill_n(row, std::size_t(w) * 3, 0.f);
+    for (std::size_t k = 0; k < kernel.size(); ++k) {
+      const float* in = &padded[k * 3];
+      const float g = kernel[k];
+      for (int i = 0; i < 3 * w; ++i) row[i] += g * in[i];
+    }
+  }
+  // Down the columns: strips that stay in the cache.
+  constexpr int kStrip = 96;
+  std::vector<float> strip(std::size_t(h) * kStrip);
+  for (int x0 = 0; x0 < 3 * w; x0 += kStrip) {
+    const int n = std::min(kStrip, 3 * w - x0);
+    for (int y = 0; y < h; ++y) std::copy_n(image.row<float>(y) + x0, n, &strip[std::size_t(y) * kStrip]);
+    for (int y = 0; y < h; ++y) {
+      float* out = image.row<float>(y) + x0;
+      std::fill_n(out, n, 0.f);
+      for (int k = -reach; k <= reach; ++k) {
+        const float* in = &strip[std::size_t(std::clamp(y + k, 0, h - 1)) * kStrip];
+        const float g = kernel[std::size_t(k + reach)];
+        for (int i = 0; i < n; ++i) out[i] += g * in[i];
+      }
+    }
+  }
+}
+
+/// Means of factor x factor pixels.
+Image binned(const Image& image, int factor) {
+  Image result(image.width() / factor, image.height() / factor, 3, PixelType::f32);
+  const float scale = 1.f / float(factor * factor);
+  for (int y = 0; y < image.height(); ++y) {
+    const float* in = image.row<float>(y);
+    float* out = result.row<float>(y / factor);
+    for (int x = 0; x < image.width(); ++x, in += 3)
+      for (int c = 0; c < 3; ++c) out[std::ptrdiff_t(3) * (x / factor) + c] += scale * in[c];
+  }
+  return result;
+}
+
+/// Exposure and uneven light.
+void light(Image& image, const PrintPhotoOptions& o) {
+  if (o.exposure == 1 && o.shading.isZero()) return;
+  for (int y = 0; y < image.height(); ++y) {
+    float* row = image.row<float>(y);
+    const float down = 1 + o.shading.y() * ((float(y) + .5f) / float(image.height()) - .5f);
+    for (int x = 0; x < image.width(); ++x) {
+      const float across = o.shading.x() * ((float(x) + .5f) / float(image.width()) - .5f);
+      const float factor = float(o.exposure) * std::max(0.f, down + across);
+      for (int c = 0; c < 3; ++c) row[3 * x + c] *= factor;
+    }
+  }
+}
+
+void add_noise(Image& image, const PrintPhotoOptions& o, std::uint64_t seed) {
+  if (o.noise_read == 0 && o.noise_shot == 0) return;
+  const float read = float(o.noise_read * o.noise_read), shot = float(o.noise_shot);
+  const std::size_t values = std::size_t(image.width()) * 3;
+  const std::uint64_t start = mix(seed);
+  for (int y = 0; y < image.height(); ++y) {
+    float* row = image.row<float>(y);
+    for (std::size_t i = 0; i < values; ++i)
+      row[i] += std::sqrt(read + shot * std::max(0.f, row[i])) *
+                gaussian(mix(start + (std::uint64_t(y) * values + i) * 0xd1342543de82ef95ull));
+  }
+}
+
+/// One colour a pixel (RGGB), the others from the mean of the nearest pixels that have them.
+Image through_bayer(const Image& image, bool clip) {
+  const int w = image.width(), h = image.height();
+  const auto color_at = [](int x, int y) { return (y & 1) + (x & 1); };  // 0 red, 1 green, 2 blue
+  const auto value = [&](int x, int y, int c) {
+    const float v = image.row<float>(y)[3 * x + c];
+    return clip ? std::clamp(v, 0.f, 1.f) : v;
+  };
+  Image result(w, h, 3, PixelType::f32);
+  for (int y = 0; y < h; ++y) {
+    float* out = result.row<float>(y);
+    for (int x = 0; x < w; ++x, out += 3) {
+      const int own = color_at(x, y);
+      std::array<float, 3> sum{}, weight{};
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx) {
+          const int u = x + dx, v = y + dy;
+          if (u < 0 || v < 0 || u >= w || v >= h) continue;
+          const int c = color_at(u, v);
+          // Green lacks at red and blue places and has four neighbours beside it; its own diagonals do not count.
+          if (c == own && (dx != 0 || dy != 0)) continue;
+          sum[std::size_t(c)] += value(u, v, c), weight[std::size_t(c)] += 1;
+        }
+      for (std::size_t c = 0; c < 3; ++c) out[c] = weight[c] > 0 ? sum[c] / weight[c] : sum[std::size_t(own)];
+    }
+  }
+  return result;
+}
+
+Image to_srgb(const Image& light) {
+  Image picture = Image::uninitialized(light.width(), light.height(), 3);
+  const std::vector<std::uint8_t>& table = srgb_table();
+  const std::size_t values = std::size_t(light.width()) * 3;
+  for (int y = 0; y < light.height(); ++y) {
+    const float* in = light.row<float>(y);
+    std::uint8_t* out = picture.row<std::uint8_t>(y);
+    for (std::size_t i = 0; i < values; ++i)
+      out[i] = table[std::size_t(std::clamp(in[i], 0.f, 1.f) * 65535.f + .5f)];
+  }
+  return picture;
+}
+
+}  // namespace
+
+Image photograph_prints(const View& view, std::span<const FlatPrint> prints, const Vector3f& background,
+                        const PrintPhotoOptions& options, std::uint64_t seed, bool linear) {
+  view.camera.validate();
+  check(options);
+  if (!background.allFinite()) refuse("must be finite", "background");
+  for (std::size_t i = 0; i < prints.size(); ++i) check(prints[i], i);
+
+  const int finer = magnification(options.blur_px);
+  Image image = flat_coverage(view, prints, background, options.edge_samples, finer);
+  if (options.blur_px > 0) blur(image, options.blur_px * finer);
+  if (finer > 1) image = binned(image, finer);
+  light(image, options);
+  add_noise(image, options, seed);
+  if (options.bayer) image = through_bayer(image, !linear);
+  if (linear) return image;
+  Image picture = to_srgb(image);
+  if (options.jpeg_quality == 0) return picture;
+  const std::string jpeg = encode_jpeg(picture, options.jpeg_quality);
+  return decode_image(std::as_bytes(std::span(jpeg)), "photograph of prints");
+}
+
+}  // namespace lumihull::rig
