@@ -73,7 +73,14 @@ class Sheet {
   /// Homogeneous coordinates on the sheet of what a ray (x, y, 1) sees; the third is positive before the camera, and
   /// the depth is distance() / it.
   Vector3d operator()(const Vector2d& ray) const {
-    return from_ray_.leftCols<2>() * ray + from_ray_.col(2);
+    const Eigen::Matrix3d& m = from_ray_;
+    return {m(0, 0) * ray.x() + m(0, 1) * ray.y() + m(0, 2), m(1, 0) * ray.x() + m(1, 1) * ray.y() + m(1, 2),
+            m(2, 0) * ray.x() + m(2, 1) * ray.y() + m(2, 2)};
+  }
+  Vector3d slope(const Vector2d& ray_step) const {
+    const Eigen::Matrix3d& m = from_ray_;
+    return {m(0, 0) * ray_step.x() + m(0, 1) * ray_step.y(), m(1, 0) * ray_step.x() + m(1, 1) * ray_step.y(),
+            m(2, 0) * ray_step.x() + m(2, 1) * ray_step.y()};
   }
   double distance() const { return distance_; }
 
@@ -126,6 +133,12 @@ class Sheet {
   std::vector<std::vector<int>> cells_;
 };
 
+/// Where a pixel's corner is on a sheet.
+struct Node {
+  Vector2d at{0, 0};  ///< NaN: nowhere
+  double depth = 0;
+};
+
 /// What one sheet shows within one pixel.
 struct Layer {
   const Sheet* sheet = nullptr;
@@ -133,6 +146,7 @@ struct Layer {
   bool bounded = false;  ///< the sheet's own edge passes
   Vector3f base{0, 0, 0};
   std::vector<const FlatShape*> edges;  ///< shapes whose edges pass, above the base
+  Vector3d h0{0, 0, 0}, dh{0, 0, 0};    ///< the scan line at hand on the sheet: h0 + t dh, homogeneous
 };
 
 }  // namespace
@@ -165,11 +179,11 @@ class FlatCoverage::Renderer {
     return camera_.correct(d);
   }
 
-  void look(std::span<const std::array<Vector3d, 4>> corners, std::span<const Sheet* const> sheets);
-  void look_at(const Sheet& sheet, const std::array<Vector3d, 4>& corner);
+  void look_at(const Sheet& sheet, const Node& a, const Node& b, const Node& c, const Node& d);
+  void order();
   void integrate(int x, int y, float* out);
-  void cross(const Layer& layer, const Vector3d& h0, const Vector3d& dh);
-  Vector3f color(const Vector2d& ray) const;
+  void cross(const Layer& layer);
+  const Vector3f& color(double t) const;
   std::size_t stride() const { return std::size_t(3) * std::size_t(camera_.width) * std::size_t(parts_); }
 
   Camera camera_;
@@ -185,35 +199,31 @@ class FlatCoverage::Renderer {
   std::vector<double> crossings_;
 };
 
-/// Adds the sheet's layer where it shows in the pixel.
-void FlatCoverage::Renderer::look_at(const Sheet& sheet, const std::array<Vector3d, 4>& corner) {
+/// Adds the sheet's layer where it shows in the pixel between four nodes.
+void FlatCoverage::Renderer::look_at(const Sheet& sheet, const Node& a, const Node& b, const Node& c, const Node& d) {
   Box box;
-  std::array<Vector2d, 4> p;
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (!(corner[i].z() > 1e-12)) return;
-    p[i] = corner[i].head<2>() / corner[i].z();
-    box.add(p[i]);
-  }
+  box.low = a.at.cwiseMin(b.at).cwiseMin(c.at.cwiseMin(d.at));
+  box.high = a.at.cwiseMax(b.at).cwiseMax(c.at.cwiseMax(d.at));
+  const Vector2d middle = 0.25 * (a.at + b.at + c.at + d.at);
+  if (std::isnan(middle.x())) return;
   const Vector2d slack = 0.02 * (box.high - box.low);  // a lens bends a pixel's sides
   box.low -= slack, box.high += slack;
   if (!box.meets(sheet.box())) return;
   if (used_ == layers_.size()) layers_.emplace_back();
   Layer& layer = layers_[used_++];
   layer.sheet = &sheet;
-  layer.depth = 4 * sheet.distance() / (corner[0].z() + corner[1].z() + corner[2].z() + corner[3].z());
+  layer.depth = a.depth + b.depth + c.depth + d.depth;
   layer.bounded = !(sheet.box().holds(box.low) && sheet.box().holds(box.high));
   layer.base = sheet.print().paper;
   layer.edges.clear();
-  const Vector2d middle = 0.25 * (p[0] + p[1] + p[2] + p[3]);
-  double reach = 0;
-  for (const Vector2d& q : p) reach = std::max(reach, (q - middle).norm());
-  reach *= 1.04;
+  const double reach = 1.04 * std::sqrt(std::max({(a.at - middle).squaredNorm(), (b.at - middle).squaredNorm(),
+                                                  (c.at - middle).squaredNorm(), (d.at - middle).squaredNorm()}));
   sheet.shapes_at(box, [&](const FlatShape& s) {
     bool edge = false;
     if (s.radius > 0) {
-      const double d = (middle - s.center).norm();
-      if (d > s.radius + reach) return;
-      edge = d > s.radius - reach;
+      const double r = (middle - s.center).norm();
+      if (r > s.radius + reach) return;
+      edge = r > s.radius - reach;
     } else {
       for (std::size_t i = 0, j = s.polygon.size() - 1; i < s.polygon.size() && !edge; j = i++)
         edge = distance_to_segment(middle, s.polygon[i], s.polygon[j]) < reach;
@@ -227,19 +237,19 @@ void FlatCoverage::Renderer::look_at(const Sheet& sheet, const std::array<Vector
   });
 }
 
-/// Collects the layers of a pixel, nearest first, down to one that hides the rest.
-void FlatCoverage::Renderer::look(std::span<const std::array<Vector3d, 4>> corners, std::span<const Sheet* const> sheets) {
-  used_ = 0;
-  for (std::size_t i = 0; i < sheets.size(); ++i) look_at(*sheets[i], corners[i]);
-  std::stable_sort(layers_.begin(), layers_.begin() + std::ptrdiff_t(used_),
-                   [](const Layer& a, const Layer& b) { return a.depth < b.depth; });
+/// Brings the layers into order, nearest first, down to one that hides the rest.
+void FlatCoverage::Renderer::order() {
+  if (used_ > 1)
+    std::stable_sort(layers_.begin(), layers_.begin() + std::ptrdiff_t(used_),
+                     [](const Layer& a, const Layer& b) { return a.depth < b.depth; });
   closed_ = false;
   for (std::size_t i = 0; i < used_ && !closed_; ++i)
     if (!layers_[i].bounded) closed_ = true, used_ = i + 1;
 }
 
-/// Parameters t in (0, 1) at which the line h0 + t dh passes an edge of the layer.
-void FlatCoverage::Renderer::cross(const Layer& layer, const Vector3d& h0, const Vector3d& dh) {
+/// Adds the parameters t in (0, 1) at which the scan line passes an edge of the layer.
+void FlatCoverage::Renderer::cross(const Layer& layer) {
+  const Vector3d &h0 = layer.h0, &dh = layer.dh;
   const auto add = [this](double t) {
     if (t > 0 && t < 1) crossings_.push_back(t);
   };
@@ -271,11 +281,11 @@ void FlatCoverage::Renderer::cross(const Layer& layer, const Vector3d& h0, const
   }
 }
 
-Vector3f FlatCoverage::Renderer::color(const Vector2d& ray) const {
+const Vector3f& FlatCoverage::Renderer::color(double t) const {
   for (std::size_t i = 0; i < used_; ++i) {
     const Layer& layer = layers_[i];
-    const Vector3d h = (*layer.sheet)(ray);
-    const Vector2d p = h.head<2>() / h.z();
+    const double z = 1 / (layer.h0.z() + t * layer.dh.z());
+    const Vector2d p((layer.h0.x() + t * layer.dh.x()) * z, (layer.h0.y() + t * layer.dh.y()) * z);
     if (layer.bounded && !layer.sheet->box().holds(p)) continue;
     for (std::size_t k = layer.edges.size(); k-- > 0;)
       if (inside(*layer.edges[k], p)) return layer.edges[k]->color;
@@ -352,8 +362,8 @@ void FlatCoverage::Renderer::integrate(int x, int y, float* out) {
     const Vector2d start = middle - .5 * direction;
     crossings_.clear();
     for (std::size_t k = 0; k < used_; ++k) {
-      const Vector3d h0 = (*layers_[k].sheet)(start), h1 = (*layers_[k].sheet)(start + direction);
-      cross(layers_[k], h0, h1 - h0);
+      layers_[k].h0 = (*layers_[k].sheet)(start), layers_[k].dh = layers_[k].sheet->slope(direction);
+      cross(layers_[k]);
     }
     for (int k = 1; k <= parts_; ++k) crossings_.push_back(double(k) / parts_);
     std::sort(crossings_.begin(), crossings_.end());
@@ -365,8 +375,9 @@ void FlatCoverage::Renderer::integrate(int x, int y, float* out) {
       const int along = int(half * parts_);
       float* part = out + (along_x ? std::size_t(across) * stride() + std::size_t(3 * along)
                                    : std::size_t(along) * stride() + std::size_t(3 * across));
-      const Vector3f value = weight * float(next - t) * color(start + half * direction);
-      for (int m = 0; m < 3; ++m) part[m] += value[m];
+      const Vector3f& value = color(half);
+      const float share = weight * float(next - t);
+      for (int m = 0; m < 3; ++m) part[m] += share * value[m];
       t = next;
     }
   }
@@ -404,18 +415,24 @@ void FlatCoverage::Renderer::tile(int x0, int y0, float* out) {
     for (int y = 1; y < height; ++y)
       for (int x = 1; x < width; ++x) rays[at(x, y)] = ray(x0 + x, y0 + y);
 
-  std::vector<Vector3d> lattice(sheets.size() * rays.size());
+  std::vector<Node> lattice(sheets.size() * rays.size());
   for (std::size_t k = 0; k < sheets.size(); ++k)
     for (int y = 0; y <= height; ++y)
-      for (int x = 0; x <= width; ++x) lattice[k * rays.size() + at(x, y)] = (*sheets[k])(rays[at(x, y)]);
-  std::vector<std::array<Vector3d, 4>> corners(sheets.size());
+      for (int x = 0; x <= width; ++x) {
+        const Vector3d h = (*sheets[k])(rays[at(x, y)]);
+        Node& node = lattice[k * rays.size() + at(x, y)];
+        node.depth = sheets[k]->distance() / h.z();
+        node.at = h.z() > 1e-12 ? Vector2d(h.head<2>() / h.z())
+                                : Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+      }
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
+      used_ = 0;
       for (std::size_t k = 0; k < sheets.size(); ++k) {
-        const Vector3d* l = &lattice[k * rays.size()];
-        corners[k] = {l[at(x, y)], l[at(x + 1, y)], l[at(x, y + 1)], l[at(x + 1, y + 1)]};
+        const Node* l = &lattice[k * rays.size() + at(x, y)];
+        look_at(*sheets[k], l[0], l[1], l[kTile + 1], l[kTile + 2]);
       }
-      look(corners, sheets);
+      order();
       float* part = out + std::size_t(y * parts_) * stride() + std::size_t(3 * (x0 + x) * parts_);
       const bool plain = used_ == 0 || (used_ == 1 && closed_ && layers_[0].edges.empty());
       const Vector3f value = !plain ? Vector3f(0, 0, 0) : used_ == 0 ? background_ : layers_[0].base;
