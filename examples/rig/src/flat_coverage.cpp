@@ -18,7 +18,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-constexpr int kTile = 16;  ///< px; sheets are looked for tile by tile
+constexpr int kTile = FlatCoverage::kTile;
 constexpr double kGauss = 0.28867513459481287;  ///< of the two points whose mean is exact for quadratics
 
 struct Box {
@@ -73,7 +73,14 @@ class Sheet {
   /// Homogeneous coordinates on the sheet of what a ray (x, y, 1) sees; the third is positive before the camera, and
   /// the depth is distance() / it.
   Vector3d operator()(const Vector2d& ray) const {
-    return from_ray_.leftCols<2>() * ray + from_ray_.col(2);
+    const Eigen::Matrix3d& m = from_ray_;
+    return {m(0, 0) * ray.x() + m(0, 1) * ray.y() + m(0, 2), m(1, 0) * ray.x() + m(1, 1) * ray.y() + m(1, 2),
+            m(2, 0) * ray.x() + m(2, 1) * ray.y() + m(2, 2)};
+  }
+  Vector3d slope(const Vector2d& ray_step) const {
+    const Eigen::Matrix3d& m = from_ray_;
+    return {m(0, 0) * ray_step.x() + m(0, 1) * ray_step.y(), m(1, 0) * ray_step.x() + m(1, 1) * ray_step.y(),
+            m(2, 0) * ray_step.x() + m(2, 1) * ray_step.y()};
   }
   double distance() const { return distance_; }
 
@@ -126,6 +133,12 @@ class Sheet {
   std::vector<std::vector<int>> cells_;
 };
 
+/// Where a pixel's corner is on a sheet.
+struct Node {
+  Vector2d at{0, 0};  ///< NaN: nowhere
+  double depth = 0;
+};
+
 /// What one sheet shows within one pixel.
 struct Layer {
   const Sheet* sheet = nullptr;
@@ -133,15 +146,18 @@ struct Layer {
   bool bounded = false;  ///< the sheet's own edge passes
   Vector3f base{0, 0, 0};
   std::vector<const FlatShape*> edges;  ///< shapes whose edges pass, above the base
+  Vector3d h0{0, 0, 0}, dh{0, 0, 0};    ///< the scan line at hand on the sheet: h0 + t dh, homogeneous
 };
 
-class Renderer {
+}  // namespace
+
+class FlatCoverage::Renderer {
  public:
-  Renderer(const View& view, std::span<const FlatPrint> prints, const Vector3f& background, int lines, int magnify)
+  Renderer(const View& view, std::span<const FlatPrint> prints, const Vector3f& background, int lines, int parts)
       : camera_(view.camera),
         background_(background),
-        lines_(std::max(4, lines / magnify)),
-        step_(1. / magnify),
+        parts_(parts),
+        lines_((lines + parts - 1) / parts * parts),
         domain_(view.camera.domain_radius()),
         distorted_(view.camera.has_distortion()) {
     sheets_.reserve(prints.size());
@@ -151,27 +167,29 @@ class Renderer {
     }
   }
 
-  void tile(Image& image, int x0, int y0);
+  void tile(int x0, int y0, float* out);
+  int width() const { return camera_.width; }
 
  private:
-  /// (x, y) of the ray (x, y, 1) through a place in the magnified picture; NaN beyond the lens's domain.
+  /// (x, y) of the ray (x, y, 1) through a place in the picture; NaN beyond the lens's domain.
   Vector2d ray(double u, double v) const {
-    const Vector2d d = camera_.distorted_from_pixel({u * step_, v * step_});
+    const Vector2d d = camera_.distorted_from_pixel({u, v});
     if (!distorted_) return d;
     if (d.norm() >= domain_) return Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
     return camera_.correct(d);
   }
 
-  void look(std::span<const std::array<Vector3d, 4>> corners, std::span<const Sheet* const> sheets);
-  void look_at(const Sheet& sheet, const std::array<Vector3d, 4>& corner);
-  Vector3f integrate(int x, int y);
-  void cross(const Layer& layer, const Vector3d& h0, const Vector3d& dh);
-  Vector3f color(const Vector2d& ray) const;
+  void look_at(const Sheet& sheet, const Node& a, const Node& b, const Node& c, const Node& d);
+  void order();
+  void integrate(int x, int y, float* out);
+  void cross(const Layer& layer);
+  const Vector3f& color(double t) const;
+  std::size_t stride() const { return std::size_t(3) * std::size_t(camera_.width) * std::size_t(parts_); }
 
   Camera camera_;
   Vector3f background_;
-  int lines_;
-  double step_, domain_;
+  int parts_, lines_;
+  double domain_;
   bool distorted_;
   std::vector<Sheet> sheets_;
 
@@ -181,35 +199,31 @@ class Renderer {
   std::vector<double> crossings_;
 };
 
-/// Adds the sheet's layer where it shows in the pixel.
-void Renderer::look_at(const Sheet& sheet, const std::array<Vector3d, 4>& corner) {
+/// Adds the sheet's layer where it shows in the pixel between four nodes.
+void FlatCoverage::Renderer::look_at(const Sheet& sheet, const Node& a, const Node& b, const Node& c, const Node& d) {
   Box box;
-  std::array<Vector2d, 4> p;
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (!(corner[i].z() > 1e-12)) return;
-    p[i] = corner[i].head<2>() / corner[i].z();
-    box.add(p[i]);
-  }
+  box.low = a.at.cwiseMin(b.at).cwiseMin(c.at.cwiseMin(d.at));
+  box.high = a.at.cwiseMax(b.at).cwiseMax(c.at.cwiseMax(d.at));
+  const Vector2d middle = 0.25 * (a.at + b.at + c.at + d.at);
+  if (std::isnan(middle.x())) return;
   const Vector2d slack = 0.02 * (box.high - box.low);  // a lens bends a pixel's sides
   box.low -= slack, box.high += slack;
   if (!box.meets(sheet.box())) return;
   if (used_ == layers_.size()) layers_.emplace_back();
   Layer& layer = layers_[used_++];
   layer.sheet = &sheet;
-  layer.depth = 4 * sheet.distance() / (corner[0].z() + corner[1].z() + corner[2].z() + corner[3].z());
+  layer.depth = a.depth + b.depth + c.depth + d.depth;
   layer.bounded = !(sheet.box().holds(box.low) && sheet.box().holds(box.high));
   layer.base = sheet.print().paper;
   layer.edges.clear();
-  const Vector2d middle = 0.25 * (p[0] + p[1] + p[2] + p[3]);
-  double reach = 0;
-  for (const Vector2d& q : p) reach = std::max(reach, (q - middle).norm());
-  reach *= 1.04;
+  const double reach = 1.04 * std::sqrt(std::max({(a.at - middle).squaredNorm(), (b.at - middle).squaredNorm(),
+                                                  (c.at - middle).squaredNorm(), (d.at - middle).squaredNorm()}));
   sheet.shapes_at(box, [&](const FlatShape& s) {
     bool edge = false;
     if (s.radius > 0) {
-      const double d = (middle - s.center).norm();
-      if (d > s.radius + reach) return;
-      edge = d > s.radius - reach;
+      const double r = (middle - s.center).norm();
+      if (r > s.radius + reach) return;
+      edge = r > s.radius - reach;
     } else {
       for (std::size_t i = 0, j = s.polygon.size() - 1; i < s.polygon.size() && !edge; j = i++)
         edge = distance_to_segment(middle, s.polygon[i], s.polygon[j]) < reach;
@@ -223,19 +237,19 @@ void Renderer::look_at(const Sheet& sheet, const std::array<Vector3d, 4>& corner
   });
 }
 
-/// Collects the layers of a pixel, nearest first, down to one that hides the rest.
-void Renderer::look(std::span<const std::array<Vector3d, 4>> corners, std::span<const Sheet* const> sheets) {
-  used_ = 0;
-  for (std::size_t i = 0; i < sheets.size(); ++i) look_at(*sheets[i], corners[i]);
-  std::stable_sort(layers_.begin(), layers_.begin() + std::ptrdiff_t(used_),
-                   [](const Layer& a, const Layer& b) { return a.depth < b.depth; });
+/// Brings the layers into order, nearest first, down to one that hides the rest.
+void FlatCoverage::Renderer::order() {
+  if (used_ > 1)
+    std::stable_sort(layers_.begin(), layers_.begin() + std::ptrdiff_t(used_),
+                     [](const Layer& a, const Layer& b) { return a.depth < b.depth; });
   closed_ = false;
   for (std::size_t i = 0; i < used_ && !closed_; ++i)
     if (!layers_[i].bounded) closed_ = true, used_ = i + 1;
 }
 
-/// Parameters t in (0, 1) at which the line h0 + t dh passes an edge of the layer.
-void Renderer::cross(const Layer& layer, const Vector3d& h0, const Vector3d& dh) {
+/// Adds the parameters t in (0, 1) at which the scan line passes an edge of the layer.
+void FlatCoverage::Renderer::cross(const Layer& layer) {
+  const Vector3d &h0 = layer.h0, &dh = layer.dh;
   const auto add = [this](double t) {
     if (t > 0 && t < 1) crossings_.push_back(t);
   };
@@ -267,11 +281,11 @@ void Renderer::cross(const Layer& layer, const Vector3d& h0, const Vector3d& dh)
   }
 }
 
-Vector3f Renderer::color(const Vector2d& ray) const {
+const Vector3f& FlatCoverage::Renderer::color(double t) const {
   for (std::size_t i = 0; i < used_; ++i) {
     const Layer& layer = layers_[i];
-    const Vector3d h = (*layer.sheet)(ray);
-    const Vector2d p = h.head<2>() / h.z();
+    const double z = 1 / (layer.h0.z() + t * layer.dh.z());
+    const Vector2d p((layer.h0.x() + t * layer.dh.x()) * z, (layer.h0.y() + t * layer.dh.y()) * z);
     if (layer.bounded && !layer.sheet->box().holds(p)) continue;
     for (std::size_t k = layer.edges.size(); k-- > 0;)
       if (inside(*layer.edges[k], p)) return layer.edges[k]->color;
@@ -280,7 +294,8 @@ Vector3f Renderer::color(const Vector2d& ray) const {
   return background_;
 }
 
-Vector3f Renderer::integrate(int x, int y) {
+/// Adds the pixel's colours to its parts.
+void FlatCoverage::Renderer::integrate(int x, int y, float* out) {
   // Rays are bilinear over the pixel, through the four Gauss points: the mean of a quadratic error is zero.
   const double u = x + .5, v = y + .5;
   const Vector2d a = ray(u - kGauss, v - kGauss), b = ray(u + kGauss, v - kGauss), c = ray(u - kGauss, v + kGauss),
@@ -339,7 +354,7 @@ Vector3f Renderer::integrate(int x, int y) {
   const bool along_x = std::abs(first.x()) >= std::abs(first.y());
   const int n = several ? 4 * lines_ : lines_;
 
-  Vector3f sum{0, 0, 0};
+  const float weight = float(parts_ * parts_) / float(n);  // of a line in a part, for its whole length
   for (int i = 0; i < n; ++i) {
     const double s = (i + .5) / n - .5;
     const Vector2d middle = along_x ? Vector2d(mean + s * dv) : Vector2d(mean + s * du);
@@ -347,22 +362,29 @@ Vector3f Renderer::integrate(int x, int y) {
     const Vector2d start = middle - .5 * direction;
     crossings_.clear();
     for (std::size_t k = 0; k < used_; ++k) {
-      const Vector3d h0 = (*layers_[k].sheet)(start), h1 = (*layers_[k].sheet)(start + direction);
-      cross(layers_[k], h0, h1 - h0);
+      layers_[k].h0 = (*layers_[k].sheet)(start), layers_[k].dh = layers_[k].sheet->slope(direction);
+      cross(layers_[k]);
     }
+    for (int k = 1; k <= parts_; ++k) crossings_.push_back(double(k) / parts_);
     std::sort(crossings_.begin(), crossings_.end());
-    crossings_.push_back(1);
+    const int across = i * parts_ / n;
     double t = 0;
     for (const double next : crossings_) {
-      if (next > t) sum += float(next - t) * color(start + .5 * (t + next) * direction);
+      if (!(next > t)) continue;
+      const double half = .5 * (t + next);
+      const int along = int(half * parts_);
+      float* part = out + (along_x ? std::size_t(across) * stride() + std::size_t(3 * along)
+                                   : std::size_t(along) * stride() + std::size_t(3 * across));
+      const Vector3f& value = color(half);
+      const float share = weight * float(next - t);
+      for (int m = 0; m < 3; ++m) part[m] += share * value[m];
       t = next;
     }
   }
-  return sum / float(n);
 }
 
-void Renderer::tile(Image& image, int x0, int y0) {
-  const int width = std::min(kTile, image.width() - x0), height = std::min(kTile, image.height() - y0);
+void FlatCoverage::Renderer::tile(int x0, int y0, float* out) {
+  const int width = std::min(kTile, camera_.width - x0), height = std::min(kTile, camera_.height - y0);
   std::array<Vector2d, std::size_t(kTile + 1) * (kTile + 1)> rays;
   const auto at = [&](int x, int y) -> std::size_t { return std::size_t(y * (kTile + 1) + x); };
   bool valid = true;
@@ -393,38 +415,40 @@ void Renderer::tile(Image& image, int x0, int y0) {
     for (int y = 1; y < height; ++y)
       for (int x = 1; x < width; ++x) rays[at(x, y)] = ray(x0 + x, y0 + y);
 
-  std::vector<Vector3d> lattice(sheets.size() * rays.size());
+  std::vector<Node> lattice(sheets.size() * rays.size());
   for (std::size_t k = 0; k < sheets.size(); ++k)
     for (int y = 0; y <= height; ++y)
-      for (int x = 0; x <= width; ++x) lattice[k * rays.size() + at(x, y)] = (*sheets[k])(rays[at(x, y)]);
-  std::vector<std::array<Vector3d, 4>> corners(sheets.size());
-  for (int y = 0; y < height; ++y) {
-    float* out = image.row<float>(y0 + y) + std::ptrdiff_t(3) * x0;
-    for (int x = 0; x < width; ++x, out += 3) {
-      for (std::size_t k = 0; k < sheets.size(); ++k) {
-        const Vector3d* l = &lattice[k * rays.size()];
-        corners[k] = {l[at(x, y)], l[at(x + 1, y)], l[at(x, y + 1)], l[at(x + 1, y + 1)]};
+      for (int x = 0; x <= width; ++x) {
+        const Vector3d h = (*sheets[k])(rays[at(x, y)]);
+        Node& node = lattice[k * rays.size() + at(x, y)];
+        node.depth = sheets[k]->distance() / h.z();
+        node.at = h.z() > 1e-12 ? Vector2d(h.head<2>() / h.z())
+                                : Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
       }
-      look(corners, sheets);
-      Vector3f value = background_;
-      if (used_ == 1 && closed_ && layers_[0].edges.empty())
-        value = layers_[0].base;
-      else if (used_ > 0)
-        value = integrate(x0 + x, y0 + y);
-      for (int c = 0; c < 3; ++c) out[c] = value[c];
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      used_ = 0;
+      for (std::size_t k = 0; k < sheets.size(); ++k) {
+        const Node* l = &lattice[k * rays.size() + at(x, y)];
+        look_at(*sheets[k], l[0], l[1], l[kTile + 1], l[kTile + 2]);
+      }
+      order();
+      float* part = out + std::size_t(y * parts_) * stride() + std::size_t(3 * (x0 + x) * parts_);
+      const bool plain = used_ == 0 || (used_ == 1 && closed_ && layers_[0].edges.empty());
+      const Vector3f value = !plain ? Vector3f(0, 0, 0) : used_ == 0 ? background_ : layers_[0].base;
+      for (int i = 0; i < parts_; ++i)
+        for (int k = 0; k < 3 * parts_; ++k) part[std::size_t(i) * stride() + std::size_t(k)] = value[k % 3];
+      if (!plain) integrate(x0 + x, y0 + y, part);
     }
-  }
 }
 
-}  // namespace
+FlatCoverage::FlatCoverage(const View& view, std::span<const FlatPrint> prints, const Vector3f& background, int lines,
+                           int parts)
+    : renderer_(std::make_unique<Renderer>(view, prints, background, lines, parts)) {}
+FlatCoverage::~FlatCoverage() = default;
 
-Image flat_coverage(const View& view, std::span<const FlatPrint> prints, const Vector3f& background, int lines,
-                    int magnify) {
-  Image image = Image::uninitialized(view.camera.width * magnify, view.camera.height * magnify, 3, PixelType::f32);
-  Renderer renderer(view, prints, background, lines, magnify);
-  for (int y = 0; y < image.height(); y += kTile)
-    for (int x = 0; x < image.width(); x += kTile) renderer.tile(image, x, y);
-  return image;
+void FlatCoverage::tile_row(int first_row, float* out) {
+  for (int x = 0; x < renderer_->width(); x += kTile) renderer_->tile(x, first_row, out);
 }
 
 }  // namespace lumihull::rig

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "flat_coverage.h"
+#include "blurred_coverage.h"
 #include "noise.h"
 #include "srgb_table.h"
 
@@ -51,65 +51,6 @@ void check(const FlatPrint& print, std::size_t i) {
     for (const Vector2d& p : s.polygon)
       if (!p.allFinite()) refuse("a polygon's point is not finite", name);
   }
-}
-
-/// How much smaller the pixels have to be for samples of a Gaussian to act as the Gaussian does: at sigma = .8 of them
-/// the spectrum's first replica is 3e-6 (exp(-2 pi² sigma²)).
-int magnification(double sigma) {
-  return sigma > 0 && sigma < .8 ? std::min(8, int(std::ceil(.8 / sigma))) : 1;
-}
-
-/// Separable; what lies beyond the border is as the border.
-void blur(Image& image, double sigma) {
-  const int reach = std::max(1, int(std::ceil(5 * sigma)));
-  std::vector<float> kernel(std::size_t(2 * reach + 1));
-  double sum = 0;
-  for (int i = -reach; i <= reach; ++i) sum += std::exp(-.5 * i * i / (sigma * sigma));
-  for (int i = -reach; i <= reach; ++i)
-    kernel[std::size_t(i + reach)] = float(std::exp(-.5 * i * i / (sigma * sigma)) / sum);
-
-  const int w = image.width(), h = image.height();
-  std::vector<float> padded(std::size_t(w + 2 * reach) * 3);
-  for (int y = 0; y < h; ++y) {
-    float* row = image.row<float>(y);
-    for (int x = -reach; x < w + reach; ++x)
-      std::copy_n(row + std::ptrdiff_t(3) * std::clamp(x, 0, w - 1), 3, &padded[std::size_t(x + reach) * 3]);
-    std::fill_n(row, std::size_t(w) * 3, 0.f);
-    for (std::size_t k = 0; k < kernel.size(); ++k) {
-      const float* in = &padded[k * 3];
-      const float g = kernel[k];
-      for (int i = 0; i < 3 * w; ++i) row[i] += g * in[i];
-    }
-  }
-  // Down the columns: strips that stay in the cache.
-  constexpr int kStrip = 96;
-  std::vector<float> strip(std::size_t(h) * kStrip);
-  for (int x0 = 0; x0 < 3 * w; x0 += kStrip) {
-    const int n = std::min(kStrip, 3 * w - x0);
-    for (int y = 0; y < h; ++y) std::copy_n(image.row<float>(y) + x0, n, &strip[std::size_t(y) * kStrip]);
-    for (int y = 0; y < h; ++y) {
-      float* out = image.row<float>(y) + x0;
-      std::fill_n(out, n, 0.f);
-      for (int k = -reach; k <= reach; ++k) {
-        const float* in = &strip[std::size_t(std::clamp(y + k, 0, h - 1)) * kStrip];
-        const float g = kernel[std::size_t(k + reach)];
-        for (int i = 0; i < n; ++i) out[i] += g * in[i];
-      }
-    }
-  }
-}
-
-/// Means of factor x factor pixels.
-Image binned(const Image& image, int factor) {
-  Image result(image.width() / factor, image.height() / factor, 3, PixelType::f32);
-  const float scale = 1.f / float(factor * factor);
-  for (int y = 0; y < image.height(); ++y) {
-    const float* in = image.row<float>(y);
-    float* out = result.row<float>(y / factor);
-    for (int x = 0; x < image.width(); ++x, in += 3)
-      for (int c = 0; c < 3; ++c) out[std::ptrdiff_t(3) * (x / factor) + c] += scale * in[c];
-  }
-  return result;
 }
 
 /// Exposure and uneven light.
@@ -190,10 +131,7 @@ Image photograph_prints(const View& view, std::span<const FlatPrint> prints, con
   if (!background.allFinite()) refuse("must be finite", "background");
   for (std::size_t i = 0; i < prints.size(); ++i) check(prints[i], i);
 
-  const int finer = magnification(options.blur_px);
-  Image image = flat_coverage(view, prints, background, options.edge_samples, finer);
-  if (options.blur_px > 0) blur(image, options.blur_px * finer);
-  if (finer > 1) image = binned(image, finer);
+  Image image = blurred_coverage(view, prints, background, options.edge_samples, options.blur_px);
   light(image, options);
   add_noise(image, options, seed);
   if (options.bayer) image = through_bayer(image, !linear);
