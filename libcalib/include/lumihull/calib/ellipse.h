@@ -19,7 +19,12 @@ struct LUMIHULL_API Ellipse {
   Eigen::Matrix3d dual_conic() const;
   /// nullopt where C* is no real ellipse.
   static std::optional<Ellipse> from_dual_conic(const Eigen::Matrix3d& dual);
-  Eigen::Vector2d point(double t) const;  ///< center + a cos t (…) + b sin t (…)
+  /// The matrix Q (2 x 2, px²) whose eigenvalues are a², b²: the contour is (x - c)ᵀ Q⁻¹ (x - c) = 1, and the dual conic's
+  /// first block is c cᵀ - Q.
+  Eigen::Matrix2d shape() const;
+  /// nullopt where Q is not positive definite.
+  static std::optional<Ellipse> from_shape(const Eigen::Vector2d& center, const Eigen::Matrix2d& shape);
+  Eigen::Vector2d point(double t) const;  ///< center + a cos t (cos, sin of angle) + b sin t (-sin, cos of angle)
 };
 
 enum class EllipseState : std::uint8_t {
@@ -35,8 +40,8 @@ enum class EllipseState : std::uint8_t {
 struct EllipseFit {
   EllipseState state = EllipseState::no_fit;
   Ellipse ellipse;
-  /// Covariance of (center x, center y, and the dual conic's A, B, C as in docs of dual_conic_fit), by propagating the
-  /// pixels' noise through the estimator. The first 2 x 2 block is the centre's, px².
+  /// Covariance of (center x, center y, Q11, Q12, Q22), px and px², Q = Ellipse::shape(), by propagating the pixels' noise
+  /// through the estimator. The first 2 x 2 block is the centre's.
   Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
   double inside = 0, outside = 0;  ///< values of the plane on both sides of the contour
   double blur_px = 0;              ///< sigma of the edge's profile
@@ -51,6 +56,8 @@ struct LUMIHULL_API EllipseOptions {
   double min_visible = 0.6;       ///< of the contour, 0 … 1
   double max_saturated = 0.1;     ///< of the contour's neighbourhood, 0 … 1
   double min_contrast_noise = 5;  ///< contrast over noise, below which nothing is measured
+  /// Of a ring: diameter of the concentric inner contour over that of the one that is measured, 0 … 0.9. 0: a disc.
+  double inner_ratio = 0;
 
   void validate() const;
 };
