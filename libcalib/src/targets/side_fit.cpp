@@ -137,8 +137,8 @@ struct Normal {
   int count = 0;
 };
 
-/// Normal equations of the band's pixels, and the priors': curvature, and slopes of the levels (to 30 % a side, so that
-/// sides of few pixels stay determined).
+/// Normal equations of the band's pixels, and the priors': curvature, slopes of the levels (to 30 % a side, so that sides
+/// of few pixels stay determined), what the other sides say.
 Normal normal_equations(const LightPlane& plane, const SideCurve& side, const SideBand& band,
                         const std::vector<Sample>& samples, const std::vector<char>& used, const Vector& p) {
   Normal n;
@@ -153,16 +153,21 @@ Normal normal_equations(const LightPlane& plane, const SideCurve& side, const Si
     ++n.count;
   }
   n.a.triangularView<Eigen::StrictlyUpper>() = n.a.transpose();
-  const auto prior = [&](int k, double sd) {
-    const double weight = 1 / (sd * sd);
+  const auto prior = [&](int k, double sd, double mean = 0) {
+    const double weight = 1 / (sd * sd), off = p[k] - mean;
     n.a(k, k) += weight;
-    n.b[k] -= weight * p[k];
-    n.chi2 += weight * p[k] * p[k];
+    n.b[k] -= weight * off;
+    n.chi2 += weight * off * off;
   };
   prior(2, std::max(1e-4, band.curvature_sd * side.length * side.length / 8));
   const double contrast = std::max(1e-6, std::abs(p[5] - p[3]));
   prior(4, 0.3 * contrast);
   prior(6, 0.3 * contrast);
+  if (band.expected) {
+    prior(3, band.expected->level_sd, band.expected->dark);
+    prior(5, band.expected->level_sd, band.expected->light);
+    prior(7, band.expected->blur_sd, band.expected->blur_px);
+  }
   return n;
 }
 
@@ -310,7 +315,7 @@ std::optional<SideFit> fit_side(const LightPlane& plane, const SideCurve& start,
   SideCurve side = start;
   Vector p = Vector::Zero();
   p.head<3>() = side.c;
-  p[7] = std::clamp(band.start_blur_px, kLeastBlur, kMostBlur);
+  p[7] = std::clamp(band.expected ? band.expected->blur_px : 1, kLeastBlur, kMostBlur);
   std::vector<Sample> samples;
   std::vector<char> used;
   Normal n;
@@ -341,6 +346,7 @@ std::optional<SideFit> fit_side(const LightPlane& plane, const SideCurve& start,
   side.c = p.head<3>();
   side.covariance = covariance.topLeftCorner<3, 3>();
   fit.curve = side;
+  fit.dark_variance = covariance(3, 3), fit.light_variance = covariance(5, 5), fit.blur_variance = covariance(7, 7);
   fit.dark = p[3], fit.light = p[5], fit.blur_px = p[7];
   fit.light_slope = p[6] / (0.5 * side.length) / p[5];
   fit.visible = double(std::count(used.begin(), used.end(), 1)) / double(used.size());

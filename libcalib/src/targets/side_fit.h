@@ -38,12 +38,18 @@ struct CellsBehind {
   bool known() const { return columns > 0; }
 };
 
+/// What a side's levels and blur are expected to be, and how surely (standard deviations): from the square's other sides.
+struct SideExpectation {
+  double dark = 0, light = 0, level_sd = 0;
+  double blur_px = 0, blur_sd = 0;
+};
+
 struct SideBand {
   double module_px = 0;        ///< thickness of the dark border along the normal
   double margin_px = 0;        ///< how far out of the edge the paper is bare
   double curvature_sd = 0;     ///< 1/px: what lenses and sheets make of a straight side (a Gaussian prior)
   double light_slope = 0;      ///< relative change of the light for each px outwards
-  double start_blur_px = 1;
+  std::optional<SideExpectation> expected;
 };
 
 struct SideFit {
@@ -51,6 +57,7 @@ struct SideFit {
   double dark = 0, light = 0;  ///< levels at the side's middle
   double light_slope = 0;      ///< relative change of the paper's level along the chord, for each px
   double blur_px = 1;          ///< sigma of the edge's profile
+  double dark_variance = 0, light_variance = 0, blur_variance = 0;
   double residual = 0;         ///< RMS residual / expected noise
   double visible = 1;          ///< share of the side that was used
   double saturated = 0;        ///< share of the paper's pixels that are clipped

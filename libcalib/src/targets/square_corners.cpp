@@ -2,12 +2,16 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/QR>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 namespace lumihull::calib {
 namespace {
+
+// The sides of one square have nearly the same levels and blur: to these shares. It binds small squares, whose sides say
+// little of either, and leaves large ones their own.
+constexpr double kLevelTie = 0.02, kBlurTie = 0.05;
 
 /// Where two sides meet: Newton's iteration on their parameters, from the end of one and the beginning of the other.
 /// nullopt for sides that are nearly parallel, or meet far from there.
@@ -61,29 +65,36 @@ SideCurve over_chord(const SideCurve& side, const Eigen::Vector2d& from, const E
   return next;
 }
 
-SquareLevels levels_of(const std::array<SideFit, 4>& sides) {
+/// Means of the sides' levels and blurs, each weighted by what its fit says of itself: a plane of light over the square.
+SquareLevels levels_of(const std::array<SideFit, 4>& sides, double& blur) {
   SquareLevels levels;
-  Eigen::Matrix<double, 4, 3> a;
-  Eigen::Vector4d light;
-  for (int k = 0; k < 4; ++k) levels.middle += 0.25 * sides[std::size_t(k)].curve.middle;
-  for (int k = 0; k < 4; ++k) {
-    const SideFit& s = sides[std::size_t(k)];
-    const Eigen::Vector2d off = s.curve.middle - levels.middle;
-    a.row(k) << 1, off.x(), off.y();
-    light[k] = s.light;
-    levels.dark += 0.25 * s.dark;
+  for (const SideFit& s : sides) levels.middle += 0.25 * s.curve.middle;
+  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b(0, 0, 0);
+  double dark_weight = 0, blur_weight = 0, size = 0, contrast = 0;
+  blur = 0;
+  for (const SideFit& s : sides) size += 0.25 * s.curve.length, contrast += 0.25 * (s.light - s.dark);
+  for (const SideFit& s : sides) {
+    const Eigen::Vector2d off = (s.curve.middle - levels.middle) / size;
+    const Eigen::Vector3d row(1, off.x(), off.y());
+    const double weight = 1 / (s.light_variance + 1e-6 * contrast * contrast);
+    a += weight * row * row.transpose();
+    b += weight * s.light * row;
+    const double w = 1 / (s.dark_variance + 1e-6 * contrast * contrast);
+    levels.dark += w * s.dark, dark_weight += w;
+    const double v = 1 / (s.blur_variance + 1e-6);
+    blur += v * s.blur_px, blur_weight += v;
   }
-  const Eigen::Vector3d plane = a.colPivHouseholderQr().solve(light);
+  levels.dark /= dark_weight;
+  blur /= blur_weight;
+  // Light that changes by more than half of itself across the square is not expected.
+  a.diagonal().tail<2>().array() += 4 / (contrast * contrast);
+  const Eigen::Vector3d plane = a.ldlt().solve(b);
   levels.light = plane[0];
-  if (levels.light > 0) levels.slope = plane.tail<2>() / plane[0];
+  if (levels.light > 0) levels.slope = plane.tail<2>() / (plane[0] * size);
   if (!levels.slope.allFinite()) levels.slope.setZero();
   return levels;
 }
-
-struct Frame {
-  Eigen::Matrix3d pixel_from_grid;  ///< side k on top
-  SideBand band;
-};
 
 /// What the band of side k is like, by the square's homography.
 std::optional<SideBand> band_of(const Quad& corners, std::size_t k, const SideCurve& side, int grid,
@@ -126,7 +137,6 @@ std::optional<SquareMeasurement> measure(const LightPlane& plane, const std::arr
   SquareMeasurement m;
   if (!corners_of(start, m.corners, nullptr)) return std::nullopt;
   std::array<SideCurve, 4> sides;
-  double blur = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     const SideCurve chord = over_chord(start[k], m.corners[k], m.corners[(k + 1) % 4]);
     if (!(chord.length >= 6)) return std::nullopt;
@@ -135,8 +145,11 @@ std::optional<SquareMeasurement> measure(const LightPlane& plane, const std::arr
     if (!band) return std::nullopt;
     band->curvature_sd = curvature_sd;
     if (first) {
-      band->start_blur_px = first->sides[k].blur_px;
-      band->light_slope = first->levels.slope.dot(chord.normal());
+      const SquareLevels& l = first->levels;
+      const double shade = l.shade(chord.middle);
+      band->light_slope = l.slope.dot(chord.normal()) / shade;
+      band->expected = {l.dark * shade, l.light * shade, kLevelTie * (l.light - l.dark), first->blur_px,
+                        kBlurTie * first->blur_px};
     }
     const auto fit = fit_side(plane, chord, *band,
                               cells.empty() ? CellsBehind{}
@@ -144,11 +157,9 @@ std::optional<SquareMeasurement> measure(const LightPlane& plane, const std::arr
     if (!fit) return std::nullopt;
     m.sides[k] = *fit;
     sides[k] = fit->curve;
-    blur += 0.25 * fit->blur_px;
   }
   if (!corners_of(sides, m.corners, &m.covariance)) return std::nullopt;
-  m.levels = levels_of(m.sides);
-  m.blur_px = blur;
+  m.levels = levels_of(m.sides, m.blur_px);
   return m;
 }
 
@@ -188,9 +199,24 @@ std::optional<SquareMeasurement> measure_square(const LightPlane& plane, const Q
 
 std::optional<SquareMeasurement> measure_square_again(const LightPlane& plane, const SquareMeasurement& first, int grid,
                                                       const std::vector<Cell>& cells, double curvature_sd) {
-  std::array<SideCurve, 4> start;
-  for (std::size_t k = 0; k < 4; ++k) start[k] = first.sides[k].curve;
-  return measure(plane, start, grid, cells, curvature_sd, &first);
+  constexpr int kRounds = 5;
+  constexpr double kRest = 0.1;  // of a corner's standard deviation
+  std::optional<SquareMeasurement> now = first;
+  for (int round = 0; round < kRounds; ++round) {
+    const SquareMeasurement last = *now;
+    std::array<SideCurve, 4> start;
+    for (std::size_t k = 0; k < 4; ++k) start[k] = last.sides[k].curve;
+    now = measure(plane, start, grid, cells, curvature_sd, &last);
+    if (!now) return std::nullopt;
+    bool rests = true;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Eigen::Vector2d moved = now->corners[k] - last.corners[k];
+      rests &= moved.squaredNorm() < kRest * kRest * now->covariance[k].trace();
+      if (round == kRounds - 1) now->covariance[k] += moved * moved.transpose();
+    }
+    if (rests) break;
+  }
+  return now;
 }
 
 }  // namespace lumihull::calib

@@ -29,7 +29,9 @@ struct SquareMeasurement {
 std::optional<SquareMeasurement> measure_square(const LightPlane& plane, const Quad& rough, double reach_px, int grid,
                                                 double curvature_sd);
 
-/// The same again from a first measurement, with what is known of the cells and of the light.
+/// The same again from a first measurement, with what is known of the cells and of the light; repeated until the corners
+/// rest, for what leaks into a blurred border depends on the answer. What they still move by in the end is added to their
+/// covariance.
 std::optional<SquareMeasurement> measure_square_again(const LightPlane& plane, const SquareMeasurement& first, int grid,
                                                       const std::vector<Cell>& cells, double curvature_sd);
 
