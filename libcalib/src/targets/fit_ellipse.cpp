@@ -1,10 +1,165 @@
-// Maximum-likelihood fit of an ellipse with its edge profile.
+// Maximum-likelihood fit of an ellipse with its edge profile: what is fitted, what is left out, what is refused.
 #include <lumihull/calib/ellipse.h>
 
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "contour_band.h"
+#include "contour_fit.h"
+#include "dual_conic_start.h"
+
 namespace lumihull::calib {
+namespace {
+
+constexpr double kHighestRatio = 1.8;  // of the band: gaps between circles are as wide as they are, 0.4 of one is ours
+constexpr double kTolerance = 0.02;    // of the step: what lenses' edges differ from a Gaussian's by
+constexpr double kSectorSigma = 4.5;   // beyond which a sector's residuals are no noise
+constexpr double kRobustSigma = 4;
+
+/// Upper limit of χ²_n / n at so many standard deviations (Wilson & Hilferty 1931).
+double chi_square_limit(int n, double sigma) {
+  const double v = 2.0 / (9.0 * n), root = 1 - v + sigma * std::sqrt(v);
+  return root * root * root;
+}
+
+double perimeter(const Ellipse& e) {
+  const double ratio = (e.a - e.b) / (e.a + e.b), h = ratio * ratio;  // Ramanujan 1914
+  return std::numbers::pi * (e.a + e.b) * (1 + 3 * h / (10 + std::sqrt(4 - 3 * h)));
+}
+
+BandWidth band_of(double s, double b, double inner_ratio, bool& ring) {
+  const double reach = 3 * s + 0.5, wall = (1 - inner_ratio) * b;
+  ring = inner_ratio > 0 && wall < 2 * reach;  // else the inner contour is far from the band
+  return {reach, reach, kHighestRatio};
+}
+
+std::optional<Ellipse> ellipse_of(const ContourModel& model, const Eigen::Vector2d& origin) {
+  const Eigen::Matrix2d root = model.root();
+  return Ellipse::from_shape(origin + model.center(), root * root);
+}
+
+/// Share of the contour's length in sectors that are used.
+double visible_share(const std::vector<ContourFit::Sector>& sectors, const Ellipse& e) {
+  const UnitFrame frame(e);
+  double all_length = 0, used = 0;
+  for (std::size_t i = 0; i < sectors.size(); ++i) {
+    const double angle = (double(i) + 0.5) * 2 * std::numbers::pi / double(sectors.size()) - std::numbers::pi;
+    const double length = (frame.root * Eigen::Vector2d(-std::sin(angle), std::cos(angle))).norm();
+    all_length += length;
+    if (sectors[i].used) used += length;
+  }
+  return used / all_length;
+}
+
+/// Marks sectors whose residuals are more than noise, and more than what all sectors have. True where any mark changed.
+bool judge_sectors(std::vector<ContourFit::Sector>& sectors) {
+  std::vector<double> levels;
+  for (const ContourFit::Sector& s : sectors)
+    if (s.pixels > 0) levels.push_back(s.squares / s.pixels);
+  if (levels.empty()) return false;
+  // A profile that is not Gaussian shows in all of them alike.
+  const auto low = levels.begin() + std::ptrdiff_t(levels.size() * 4 / 10);
+  std::nth_element(levels.begin(), low, levels.end());
+  const double common = std::max(1.0, *low);
+  bool changed = false;
+  for (ContourFit::Sector& s : sectors) {
+    const bool used = s.pixels > 0 && s.squares <= common * s.pixels * chi_square_limit(s.pixels, kSectorSigma);
+    changed |= used != s.used;
+    s.used = used;
+  }
+  return changed;
+}
+
+}  // namespace
 
 EllipseFit fit_ellipse(const LightPlane& plane, const Ellipse& guess, const EllipseOptions& options) {
-  return dual_conic_fit(plane, guess, options);
+  options.validate();
+  EllipseFit fit = dual_conic_start(plane, guess, options, false);
+  if (fit.state != EllipseState::good && fit.state != EllipseState::no_fit) return fit;
+  if (fit.state == EllipseState::no_fit && !(guess.b >= 1 && guess.a <= 1e5 && fit.inside != fit.outside)) return fit;
+  const Ellipse start = fit.ellipse;
+  fit.state = EllipseState::no_fit;
+
+  const PixelBox picture{0, 0, plane.values.width(), plane.values.height()};
+  const Eigen::Vector2d origin = start.center;
+  ContourFit pixels(plane, origin, std::sqrt(start.a * start.b));
+  ContourModel model;
+  const UnitFrame frame(start);
+  const double blur = std::clamp(fit.blur_px, 0.5, 3.0);
+  model.p << 0, 0, frame.root(0, 0), frame.root(0, 1), frame.root(1, 1), std::sqrt(blur * blur + 1.0 / 12), fit.outside,
+      fit.inside - fit.outside, 0, 0, options.inner_ratio;
+
+  const int sectors = std::clamp(int(perimeter(start) / 1.6), 12, ContourFit::kMaxSectors);
+  Ellipse ellipse = start;
+  bool ring = false;
+  for (int round = 0; round < 2; ++round) {
+    const BandWidth band = band_of(model.p[ContourModel::blur], ellipse.b, options.inner_ratio, ring);
+    const double ratio = ring ? options.inner_ratio : 0;
+    pixels.gather(ellipse, band, sectors);
+    if (pixels.gathered() < 2 * ContourModel::kSize) return fit;
+    pixels.weigh(model);
+    if (!pixels.solve(model, 20, 0, ratio)) return fit;
+    pixels.measure_sectors(model, kTolerance);
+    if (judge_sectors(pixels.sectors())) {
+      // Something disturbs. A fit that it does not pull shows which part it is; then the rest is fitted alone.
+      for (ContourFit::Sector& s : pixels.sectors()) s.used = true;
+      pixels.weigh(model);
+      const double noise = std::sqrt(std::max(1e-14, plane.noise.variance(model.p[ContourModel::outside])));
+      const double floor = kTolerance * std::abs(model.p[ContourModel::step]) / noise;
+      for (int i = 0; i < 3; ++i) {
+        const double scale = std::clamp(pixels.robust_scale(model), 1.0, 10.0);
+        if (!pixels.solve(model, 10, kRobustSigma * std::max(scale, floor), ratio)) return fit;
+      }
+      for (int i = 0; i < 4; ++i) {
+        pixels.measure_sectors(model, kTolerance);
+        if (!judge_sectors(pixels.sectors()) && i > 0) break;
+        pixels.weigh(model);
+        if (pixels.pixels() < 2 * ContourModel::kSize) {
+          fit.state = EllipseState::occluded;
+          return fit;
+        }
+        if (!pixels.solve(model, 10, 0, ratio)) return fit;
+      }
+    }
+    const std::optional<Ellipse> now = ellipse_of(model, origin);
+    if (!now || !(now->b >= 0.5)) return fit;
+    ellipse = *now;
+    if (!contains(picture, ellipse, 0)) {
+      fit.state = EllipseState::at_border;
+      return fit;
+    }
+  }
+
+  fit.ellipse = ellipse;
+  fit.outside = model.p[ContourModel::outside];
+  fit.inside = fit.outside + model.p[ContourModel::step];
+  fit.blur_px = std::sqrt(std::max(0.0, model.p[ContourModel::blur] * model.p[ContourModel::blur] - 1.0 / 12));
+  fit.visible = visible_share(pixels.sectors(), ellipse);
+  const int freedom = pixels.pixels() - (ring ? ContourModel::kSize : ContourModel::kSize - 1);
+  if (freedom <= 0) return fit;
+  const double variance_ratio = pixels.squares() / freedom;
+  fit.residual = std::sqrt(variance_ratio);
+
+  // d Q / d root, Q = root².
+  Eigen::Matrix<double, 5, ContourModel::kSize> j = Eigen::Matrix<double, 5, ContourModel::kSize>::Zero();
+  const double m11 = model.p[ContourModel::root11], m12 = model.p[ContourModel::root12],
+               m22 = model.p[ContourModel::root22];
+  j.topLeftCorner<2, 2>().setIdentity();
+  j.block<3, 3>(2, ContourModel::root11) << 2 * m11, 2 * m12, 0, m12, m11 + m22, m12, 0, 2 * m12, 2 * m22;
+  const ContourModel::Matrix inverse = pixels.information().inverse();
+  fit.covariance = j * inverse * j.transpose() * std::max(1.0, variance_ratio / 1.3);
+  if (!fit.covariance.allFinite() || !(fit.covariance(0, 0) > 0) || !(fit.covariance(1, 1) > 0)) return fit;
+
+  const double noise = std::sqrt(std::max(1e-14, plane.noise.variance(0.5 * (fit.inside + fit.outside))));
+  const double step = std::abs(model.p[ContourModel::step]), tolerated = kTolerance * step / noise;
+  if (pixels.clipped() > options.max_saturated * pixels.gathered()) fit.state = EllipseState::saturated;
+  else if (step < options.min_contrast_noise * noise) fit.state = EllipseState::no_contrast;
+  else if (fit.visible < options.min_visible) fit.state = EllipseState::occluded;
+  else if (variance_ratio > 2 + 4 * tolerated * tolerated) fit.state = EllipseState::no_fit;
+  else fit.state = EllipseState::good;
+  return fit;
 }
 
 }  // namespace lumihull::calib
