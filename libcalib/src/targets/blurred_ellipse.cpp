@@ -10,7 +10,7 @@
 namespace lumihull::calib {
 namespace {
 
-constexpr double kSpacing = 1.2;  // of nodes, in units of s: the sum is right to 1e-6
+constexpr double kSpacing = 1.3;  // of nodes, in units of s: the sum is right to 1e-5
 constexpr float kReach = 4.6f;    // of the Gaussian, in units of s: 2e-6 are beyond
 
 }  // namespace
@@ -26,7 +26,8 @@ void BlurredEllipse::set(const Eigen::Vector2d& center, const Eigen::Matrix2d& r
 
 void BlurredEllipse::add_contour(const Eigen::Vector2d& center, const Eigen::Matrix2d& root, double ratio,
                                  double sign) {
-  const double longest = ratio * root.norm();  // at least the longer semi-axis
+  const double longest =
+      ratio * (0.5 * root.trace() + std::hypot(0.5 * (root(0, 0) - root(1, 1)), root(0, 1)));  // the longer semi-axis
   const int wanted = std::max(16, int(std::ceil(2 * std::numbers::pi * longest / (kSpacing * s_))));
   const int count = (wanted + kGroup - 1) / kGroup * kGroup;
   const double step = 2 * std::numbers::pi / count, det = ratio * ratio * root.determinant();
@@ -70,6 +71,17 @@ void BlurredEllipse::evaluate(const Pixels& p, Share& share) const {
     const Group& box = groups_[g];
     if (box.low_x > window.high_x || box.high_x < window.low_x || box.low_y > window.high_y || box.high_y < window.low_y)
       continue;
+    const float nearest = p.side == right    ? box.low_x - scale * p.high_x
+                          : p.side == left   ? scale * p.low_x - box.high_x
+                          : p.side == bottom ? box.low_y - scale * p.high_y
+                                             : scale * p.low_y - box.high_y;
+    if (nearest > kReach) {  // all of it beyond the pixels: Φ = 1, G = 0
+      for (const Node* n = &nodes_[kGroup * g]; n != &nodes_[kGroup * g] + kGroup; ++n) {
+        const Lanes t = along_x ? all(n->y) - py : all(n->x) - px;
+        w += exp_of_negative(all(-0.5f) * t * t) * all(direction * (along_x ? n->nx : n->ny));
+      }
+      continue;
+    }
     for (const Node* n = &nodes_[kGroup * g]; n != &nodes_[kGroup * g] + kGroup; ++n) {
       const Lanes x = all(n->x) - px, y = all(n->y) - py, xx = x * x, yy = y * y;
       const Lanes ex = exp_of_negative(all(-0.5f) * xx), ey = exp_of_negative(all(-0.5f) * yy), e = ex * ey;

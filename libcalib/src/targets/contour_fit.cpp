@@ -11,9 +11,10 @@ namespace lumihull::calib {
 namespace {
 
 constexpr int kSize = ContourModel::kSize;
-constexpr double kLightSd = 0.5;   // of the light's change over one unit, a priori
+// The light's relative change over a pixel, a priori: 15 % over a thousand pixels, with the tails of a Cauchy distribution,
+// so that where the picture shows more it is believed.
+constexpr double kLightChange = 1.5e-4;
 constexpr double kRatioSd = 0.03;  // of a ring's ratio, a priori: ink spreads
-constexpr double kConverged = 1e-6;  // squared step in standard deviations
 constexpr int kFlush = 32;         // blocks that are summed in float
 
 }  // namespace
@@ -65,22 +66,28 @@ void ContourFit::for_each_residual(const ContourModel& model, Body&& body) {
   share_.set(model.center(), model.root(), model.p[ContourModel::blur], ring_ ? model.p[ContourModel::ratio] : 0);
   BlurredEllipse::Share share;
   const Lanes gx = all(float(model.p[ContourModel::light_x] / unit_)), gy = all(float(model.p[ContourModel::light_y] / unit_));
+  // The light falls on the print before it is blurred: ∫ f(q) (1 + g·q) G(q - p) dq = (1 + g·p) w + s² g·∇w.
+  const Lanes spread = all(float(model.p[ContourModel::blur] * model.p[ContourModel::blur]));
   const Lanes outside = all(float(model.p[ContourModel::outside])), step = all(float(model.p[ContourModel::step]));
   for (Block& block : blocks_) {
     share_.evaluate(block.pixels, share);
     const Lanes light = all(1) + gx * block.pixels.x + gy * block.pixels.y;
     const Lanes plain = outside + step * share.w;
-    body(block, share, light, plain, block.value - plain * light);
+    block.expected = plain * light - step * spread * (gx * share.by_center[0] + gy * share.by_center[1]);
+    body(block, share, light, plain, block.value - block.expected);
   }
 }
 
-void ContourFit::weigh(const ContourModel& model) {
+void ContourFit::expect(const ContourModel& model, double inner_ratio) {
+  ring_ = inner_ratio > 0;
+  for_each_residual(model, [](const Block&, const BlurredEllipse::Share&, const Lanes&, const Lanes&, const Lanes&) {});
+}
+
+void ContourFit::weigh() {
   pixels_ = clipped_ = 0;
-  for_each_residual(model, [&](Block& block, const BlurredEllipse::Share&, const Lanes& light, const Lanes& plain,
-                               const Lanes&) {
-    const Lanes expected = plain * light;
+  for (Block& block : blocks_)
     for (int i = 0; i < kLanes; ++i) {
-      const double v = double(expected[i]), variance = std::max(1e-14, plane_.noise.variance(v));
+      const double v = double(block.expected[i]), variance = std::max(1e-14, plane_.noise.variance(v));
       // By the model, not only by the value: to leave out those that noise has lifted would pull the level down.
       const bool clipped = block.value[i] >= plane_.saturation || v > double(plane_.saturation) - 2 * std::sqrt(variance);
       const bool counts = i < block.count && !clipped && sectors_[block.sector[std::size_t(i)]].used;
@@ -89,7 +96,6 @@ void ContourFit::weigh(const ContourModel& model) {
       pixels_ += counts;
       clipped_ += i < block.count && clipped;
     }
-  });
 }
 
 double ContourFit::evaluate(const ContourModel& model, double robust, ContourModel::Matrix* normal,
@@ -114,6 +120,7 @@ double ContourFit::evaluate(const ContourModel& model, double robust, ContourMod
     squares += total(kPairs + kSize);
   };
   const Lanes per_unit = all(float(1 / unit_)), step = all(float(model.p[ContourModel::step]));
+  const Lanes spread = step * all(float(model.p[ContourModel::blur] * model.p[ContourModel::blur]));
   const Lanes limit = all(robust > 0 ? float(1 / (robust * robust)) : 0.0f);
   int since = 0;
   for_each_residual(model, [&](Block& block, const BlurredEllipse::Share& share, const Lanes& light, const Lanes& plain,
@@ -125,7 +132,8 @@ double ContourFit::evaluate(const ContourModel& model, double robust, ContourMod
                                 by_share * share.by_root[0],   by_share * share.by_root[1],
                                 by_share * share.by_root[2],   by_share * share.by_s,
                                 light,                         light * share.w,
-                                plain * block.pixels.x * per_unit, plain * block.pixels.y * per_unit,
+                                (plain * block.pixels.x - spread * share.by_center[0]) * per_unit,
+                                (plain * block.pixels.y - spread * share.by_center[1]) * per_unit,
                                 by_share * share.by_ratio};
     std::size_t k = 0;
     for (int i = 0; i < size; ++i) {
@@ -141,28 +149,32 @@ double ContourFit::evaluate(const ContourModel& model, double robust, ContourMod
   return squares;
 }
 
-bool ContourFit::solve(ContourModel& model, int max_iterations, double robust, double inner_ratio) {
+bool ContourFit::solve(ContourModel& model, int max_iterations, double converged, double robust,
+                       double inner_ratio) {
   using Vector = ContourModel::Vector;
   using Matrix = ContourModel::Matrix;
   ring_ = inner_ratio > 0;
   const double least_blur = 0.3, most_blur = std::max(1.0, 0.8 * unit_);
   const double size = model.root().determinant();
   const auto with_prior = [&](const ContourModel& m, double squares, Matrix* h, Vector* b) {
-    const auto add = [&](int i, double expected, double sd) {
-      const double off = m.p[i] - expected;
-      if (h) (*h)(i, i) += 1 / (sd * sd), (*b)[i] -= off / (sd * sd);
-      squares += off * off / (sd * sd);
-    };
-    add(ContourModel::light_x, 0, kLightSd);
-    add(ContourModel::light_y, 0, kLightSd);
-    if (ring_) add(ContourModel::ratio, inner_ratio, kRatioSd);
-    else if (h) (*h)(ContourModel::ratio, ContourModel::ratio) = 1;
+    const Eigen::Vector2d light = m.p.segment<2>(ContourModel::light_x);
+    const double expected = kLightChange * kLightChange * unit_ * unit_, spread = expected + light.squaredNorm();
+    if (h) {
+      h->diagonal().segment<2>(ContourModel::light_x).array() += 1 / spread;
+      b->segment<2>(ContourModel::light_x) -= light / spread;
+    }
+    squares += std::log(spread / expected);
+    constexpr int kRatio = ContourModel::ratio;
+    const double weight = ring_ ? 1 / (kRatioSd * kRatioSd) : 1, off = ring_ ? m.p[kRatio] - inner_ratio : 0;
+    if (h) (*h)(kRatio, kRatio) += weight, (*b)[kRatio] -= weight * off;
+    squares += weight * off * off;
     return squares;
   };
   Matrix h;
   Vector b;
   double squares = evaluate(model, robust, &h, &b), lambda = 1e-3;
   double loss = with_prior(model, squares, &h, &b);
+  bool current = true;  // what is expected is the model's
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     Matrix damped = h;
     damped.diagonal() *= 1 + lambda;
@@ -179,51 +191,52 @@ bool ContourFit::solve(ContourModel& model, int max_iterations, double robust, d
     Matrix next_h;
     Vector next_b;
     if (better) {
+      current = false;
       const double next_squares = evaluate(next, robust, &next_h, &next_b);
       const double next_loss = with_prior(next, next_squares, &next_h, &next_b);
       better = next_loss <= loss * (1 + 1e-6);
       if (better) {
         const double moved = step.dot(h * step);
+        current = true;
         model = next;
         squares = next_squares;
         loss = next_loss;
         h = next_h;
         b = next_b;
         lambda = std::max(1e-7, lambda * 0.1);
-        if (moved < kConverged) break;
+        if (moved < converged) break;
         continue;
       }
     }
-    if (step.dot(h * step) < kConverged) break;
+    if (step.dot(h * step) < converged) break;
     lambda *= 10;
     if (lambda > 1e6) break;
   }
+  if (!current) expect(model, inner_ratio);
   squares_ = squares;
   information_ = h;
   return std::isfinite(squares);
 }
 
-void ContourFit::measure_sectors(const ContourModel& model, double tolerance) {
+void ContourFit::measure_sectors(double tolerance) {
   for (Sector& s : sectors_) s.pixels = 0, s.squares = 0;
-  const float play = float(tolerance * model.p[ContourModel::step] * tolerance * model.p[ContourModel::step]);
-  for_each_residual(model, [&](Block& block, const BlurredEllipse::Share&, const Lanes&, const Lanes&,
-                               const Lanes& residual) {
+  const float play = float(tolerance * tolerance);
+  for (const Block& block : blocks_)
     for (int i = 0; i < block.count; ++i) {
       if (block.value[i] >= plane_.saturation) continue;
       Sector& s = sectors_[block.sector[std::size_t(i)]];
+      const float residual = block.value[i] - block.expected[i];
       ++s.pixels;
-      s.squares += double(residual[i] * residual[i] / (block.variance[i] + play));
+      s.squares += double(residual * residual / (block.variance[i] + play));
     }
-  });
 }
 
-double ContourFit::robust_scale(const ContourModel& model) {
+double ContourFit::robust_scale() {
   scratch_.clear();
-  for_each_residual(model, [&](Block& block, const BlurredEllipse::Share&, const Lanes&, const Lanes&,
-                               const Lanes& residual) {
+  for (const Block& block : blocks_)
     for (int i = 0; i < block.count; ++i)
-      if (block.value[i] < plane_.saturation) scratch_.push_back(std::abs(residual[i]) / std::sqrt(block.variance[i]));
-  });
+      if (block.value[i] < plane_.saturation)
+        scratch_.push_back(std::abs(block.value[i] - block.expected[i]) / std::sqrt(block.variance[i]));
   if (scratch_.empty()) return 0;
   const auto middle = scratch_.begin() + std::ptrdiff_t(scratch_.size() / 2);
   std::nth_element(scratch_.begin(), middle, scratch_.end());

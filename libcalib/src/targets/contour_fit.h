@@ -13,7 +13,8 @@
 
 namespace lumihull::calib {
 
-/// Values of an ellipse's picture:  (outside + step · w(p)) (1 + light · p / unit), p from an origin near its centre.
+/// Values of an ellipse's picture:  (outside + step · w(p)) (1 + light · p / unit), p from an origin near its centre, and what
+/// blurring makes of the light's change.
 struct ContourModel {
   enum Index { cx, cy, root11, root12, root22, blur, outside, step, light_x, light_y, ratio, kSize };
   using Vector = Eigen::Matrix<double, kSize, 1>;
@@ -45,19 +46,22 @@ class ContourFit {
 
   /// Takes the band's pixels; `sectors` parts of the contour, equal in the ellipse's own angle.
   void gather(const Ellipse& ellipse, const BandWidth& band, int sectors);
-  /// Weights of the pixels by the model's values; clipped ones (by value or by the model) and those of sectors that are not
-  /// used count nothing.
-  void weigh(const ContourModel& model);
+  /// What the model expects of each pixel, for weigh, measure_sectors and robust_scale; solve leaves its answer's.
+  void expect(const ContourModel& model, double inner_ratio);
+  /// Weights of the pixels by the expected values; clipped ones (by value or by what is expected) and those of sectors that
+  /// are not used count nothing.
+  void weigh();
 
   /// Levenberg-Marquardt. robust > 0: the Geman-McClure loss r² / (1 + r²), r in units of `robust` standard deviations.
   /// inner_ratio: 0, or what is expected of a ring's. False where it left its basin.
-  bool solve(ContourModel& model, int max_iterations, double robust, double inner_ratio);
+  /// converged: squared length of a step, in standard deviations, that ends it.
+  bool solve(ContourModel& model, int max_iterations, double converged, double robust, double inner_ratio);
 
-  /// Residuals by sector, pixels of unused sectors included; tolerance: a part of the step.
-  void measure_sectors(const ContourModel& model, double tolerance);
+  /// Residuals by sector, pixels of unused sectors included; tolerance: of the values.
+  void measure_sectors(double tolerance);
 
   /// Median of |residual| / standard deviation, over 0.6745.
-  double robust_scale(const ContourModel& model);
+  double robust_scale();
 
   std::vector<Sector>& sectors() { return sectors_; }
   /// Of the last solve: Σ residual² / variance, pixels that counted, inverse of the normal matrix.
@@ -70,7 +74,7 @@ class ContourFit {
  private:
   struct Block {
     BlurredEllipse::Pixels pixels;
-    Lanes value, weight, variance;
+    Lanes value, weight, variance, expected;
     std::array<std::uint8_t, kLanes> sector;
     std::uint8_t count = 0;
   };

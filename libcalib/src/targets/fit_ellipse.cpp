@@ -29,10 +29,11 @@ double perimeter(const Ellipse& e) {
   return std::numbers::pi * (e.a + e.b) * (1 + 3 * h / (10 + std::sqrt(4 - 3 * h)));
 }
 
-BandWidth band_of(double s, double b, double inner_ratio, bool& ring) {
-  const double reach = 3 * s + 0.5, wall = (1 - inner_ratio) * b;
-  ring = inner_ratio > 0 && wall < 2 * reach;  // else the inner contour is far from the band
-  return {reach, reach, kHighestRatio};
+/// The edge reaches 3 s; beyond, the light's levels and gradients are measured. The start is made with less.
+BandWidth band_of(double s, double b, double inner_ratio, bool wide, bool& ring) {
+  const double reach = wide ? 6 * s + 2 : 3 * s + 0.5, wall = (1 - inner_ratio) * b, apart = wall - (3 * s + 0.5);
+  ring = inner_ratio > 0 && apart < 3 * s + 0.5;  // else the band ends before the inner contour begins
+  return {inner_ratio > 0 && !ring ? std::min(reach, apart) : reach, reach, kHighestRatio};
 }
 
 std::optional<Ellipse> ellipse_of(const ContourModel& model, const Eigen::Vector2d& origin) {
@@ -95,32 +96,33 @@ EllipseFit fit_ellipse(const LightPlane& plane, const Ellipse& guess, const Elli
   Ellipse ellipse = start;
   bool ring = false;
   for (int round = 0; round < 2; ++round) {
-    const BandWidth band = band_of(model.p[ContourModel::blur], ellipse.b, options.inner_ratio, ring);
+    const BandWidth band = band_of(model.p[ContourModel::blur], ellipse.b, options.inner_ratio, round > 0, ring);
     const double ratio = ring ? options.inner_ratio : 0;
     pixels.gather(ellipse, band, sectors);
     if (pixels.gathered() < 2 * ContourModel::kSize) return fit;
-    pixels.weigh(model);
-    if (!pixels.solve(model, 20, 0, ratio)) return fit;
-    pixels.measure_sectors(model, kTolerance);
+    pixels.expect(model, ratio);
+    pixels.weigh();
+    if (!pixels.solve(model, 20, round > 0 ? 1e-5 : 1e-2, 0, ratio)) return fit;
+    pixels.measure_sectors(kTolerance * model.p[ContourModel::step]);
     if (judge_sectors(pixels.sectors())) {
       // Something disturbs. A fit that it does not pull shows which part it is; then the rest is fitted alone.
       for (ContourFit::Sector& s : pixels.sectors()) s.used = true;
-      pixels.weigh(model);
+      pixels.weigh();
       const double noise = std::sqrt(std::max(1e-14, plane.noise.variance(model.p[ContourModel::outside])));
       const double floor = kTolerance * std::abs(model.p[ContourModel::step]) / noise;
       for (int i = 0; i < 3; ++i) {
-        const double scale = std::clamp(pixels.robust_scale(model), 1.0, 10.0);
-        if (!pixels.solve(model, 10, kRobustSigma * std::max(scale, floor), ratio)) return fit;
+        const double scale = std::clamp(pixels.robust_scale(), 1.0, 10.0);
+        if (!pixels.solve(model, 10, 1e-3, kRobustSigma * std::max(scale, floor), ratio)) return fit;
       }
       for (int i = 0; i < 4; ++i) {
-        pixels.measure_sectors(model, kTolerance);
+        pixels.measure_sectors(kTolerance * model.p[ContourModel::step]);
         if (!judge_sectors(pixels.sectors()) && i > 0) break;
-        pixels.weigh(model);
+        pixels.weigh();
         if (pixels.pixels() < 2 * ContourModel::kSize) {
           fit.state = EllipseState::occluded;
           return fit;
         }
-        if (!pixels.solve(model, 10, 0, ratio)) return fit;
+        if (!pixels.solve(model, 10, 1e-5, 0, ratio)) return fit;
       }
     }
     const std::optional<Ellipse> now = ellipse_of(model, origin);
