@@ -31,12 +31,20 @@ struct DecodedTarget {
 ///
 /// Circle families (paper, fig. 5, and its successors): a grid x grid arrangement of circles of one outer diameter. dark:
 /// a disc; light: a ring, so that every outer contour can be measured whatever the id. The left column and the bottom row
-/// are dark: an L that gives the orientation. The other cells hold the id; bits in row-major order from the top left.
+/// are dark: an L that gives the orientation. The other cells hold the id.
 ///
-/// - "paper4x4": 9 cells, value = Σ 2^i b_i; no check. 400 of the 512 values have no second dark L.
-/// - "matrix5x5": 16 cells, Nordstrom-Robinson code (Nordstrom & Robinson 1967): 256 words, distance 6, corrects 2.
-/// - "matrix6x6": 24 cells and one light circle opposite of the L's corner; extended Golay code (Golay 1949): 4096
-///   words, distance 8, corrects 3.
+/// | family      | cells of the id                                | ids  | distance upright | in any rotation | corrects |
+/// |-------------|------------------------------------------------|------|------------------|-----------------|----------|
+/// | "paper4x4"  | 9, row-major: id = Σ 2^i b_i; no check         |  400 | 1                | 1               | 0        |
+/// | "matrix5x5" | 16, Nordstrom-Robinson code                    |  256 | 6                | 4               | 2        |
+/// | "matrix6x6" | 24, extended Golay code; the cell opposite of  | 4096 | 8                | 6               | 3        |
+/// |             | the L's corner is always light                 |      |                  |                 |          |
+///
+/// (Nordstrom & Robinson 1967; Golay 1949.) Distance: in how many of all grid x grid cells, those of the L included, two
+/// ids differ at least; "in any rotation": one of them turned by 0 to 3 quarters, and an id turned by 1 to 3 quarters
+/// against itself, too. paper4x4 has 512 values, of which 112 show a second dark L when turned and are left out. The
+/// matrix codes' bits are ordered and inverted such that all words keep those distances, and that a field of dark circles
+/// alone is 4 cells (6 x 6: 5) from every word.
 ///
 /// Square families are those of AprilTag ("apriltag:36h11", …) and ArUco ("aruco:6x6_250", …); their grids include the
 /// black border, not the white one around it.
@@ -56,15 +64,18 @@ class LUMIHULL_API TargetFamily {
   /// The ids that may be printed, ascending: those that can't be taken for another one when turned.
   std::span<const int> ids() const noexcept;
   bool has(int id) const noexcept;
-  /// Least number of cells in which two of ids() differ, over all four rotations of one of them.
+  /// Least number of cells in which two of ids() differ, one of them turned by 0 to 3 quarters, or one of them from
+  /// itself turned by 1 to 3. Counted at the first call (up to 0.1 s).
   int minimum_distance() const noexcept;
 
   /// The cells of an id, grid x grid, row-major from the top left. Error{invalid_argument} where !has(id).
   std::vector<Cell> cells(int id) const;
 
-  /// Reads grid x grid cells in any rotation. Circle families only. nullopt where no id, or more than one, is within the
-  /// family's power: 2 · wrong + erased < distance, and for "paper4x4" nothing may be wrong or erased. `strength` (0 … 1)
-  /// lowers how many wrong cells are corrected: 0 accepts none.
+  /// Reads grid x grid cells in any rotation. nullopt where no id in no rotation, or more than one, is within the
+  /// family's power, 2 · wrong + erased < distance upright (the L's cells count like others): never wrong where
+  /// 2 · wrong + erased < minimum_distance(); beyond it ambiguous readings are refused (two wrong cells of "matrix5x5":
+  /// about one in eight). `strength` (0 … 1) lowers how many wrong cells are corrected: 0 accepts none. About 10 µs.
+  /// Error{invalid_argument}: another number of cells, a square family, strength out of range.
   std::optional<DecodedTarget> decode(std::span<const Cell> cells, double strength = 1) const;
 
   bool operator==(const TargetFamily& other) const noexcept { return name() == other.name(); }
