@@ -74,6 +74,8 @@ void ContourFit::for_each_residual(const ContourModel& model, Body&& body) {
     const Lanes light = all(1) + gx * block.pixels.x + gy * block.pixels.y;
     const Lanes plain = outside + step * share.w;
     block.expected = plain * light - step * spread * (gx * share.by_center[0] + gy * share.by_center[1]);
+    const Lanes slope2 = share.by_center[0] * share.by_center[0] + share.by_center[1] * share.by_center[1];
+    for (int i = 0; i < kLanes; ++i) block.slope[i] = step[i] * std::sqrt(slope2[i]);
     body(block, share, light, plain, block.value - block.expected);
   }
 }
@@ -154,7 +156,7 @@ bool ContourFit::solve(ContourModel& model, int max_iterations, double converged
   using Vector = ContourModel::Vector;
   using Matrix = ContourModel::Matrix;
   ring_ = inner_ratio > 0;
-  const double least_blur = 0.3, most_blur = std::max(1.0, 0.8 * unit_);
+  const double least_blur = 0.3, most_blur = std::min(std::max(0.85 * unit_, 1.0), std::max(2.6, 0.3 * unit_));
   const double size = model.root().determinant();
   const auto with_prior = [&](const ContourModel& m, double squares, Matrix* h, Vector* b) {
     const Eigen::Vector2d light = m.p.segment<2>(ContourModel::light_x);
@@ -219,7 +221,7 @@ bool ContourFit::solve(ContourModel& model, int max_iterations, double converged
 }
 
 void ContourFit::measure_sectors(double tolerance) {
-  for (Sector& s : sectors_) s.pixels = 0, s.squares = 0;
+  for (Sector& s : sectors_) s.pixels = 0, s.squares = s.shift = s.shift_sd_px = 0;
   const float play = float(tolerance * tolerance);
   for (const Block& block : blocks_)
     for (int i = 0; i < block.count; ++i) {
@@ -227,8 +229,15 @@ void ContourFit::measure_sectors(double tolerance) {
       Sector& s = sectors_[block.sector[std::size_t(i)]];
       const float residual = block.value[i] - block.expected[i];
       ++s.pixels;
-      s.squares += double(residual * residual / (block.variance[i] + play));
+      const float weight = 1 / (block.variance[i] + play);
+      s.squares += double(residual * residual * weight);
+      s.shift += double(residual * block.slope[i] * weight);
+      s.shift_sd_px += double(block.slope[i] * block.slope[i] * weight);
     }
+  for (Sector& s : sectors_) {
+    s.shift_sd_px = 1 / std::sqrt(std::max(1e-30, s.shift_sd_px));
+    s.shift *= s.shift_sd_px;
+  }
 }
 
 double ContourFit::robust_scale() {

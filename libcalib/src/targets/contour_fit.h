@@ -38,6 +38,8 @@ class ContourFit {
   struct Sector {
     int pixels = 0;
     double squares = 0;  ///< Σ residual² / (variance + tolerance²)
+    /// How far the contour lies outward of where it should, in standard deviations, and of how many px one is.
+    double shift = 0, shift_sd_px = 0;
     bool used = true;
   };
 
@@ -74,7 +76,7 @@ class ContourFit {
  private:
   struct Block {
     BlurredEllipse::Pixels pixels;
-    Lanes value, weight, variance, expected;
+    Lanes value, weight, variance, expected, slope;  // slope: d expected / d (the contour moves outward by 1 px)
     std::array<std::uint8_t, kLanes> sector;
     std::uint8_t count = 0;
   };
