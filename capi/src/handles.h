@@ -5,6 +5,7 @@
 #include <lumihull/base/capture.h>
 #include <lumihull/base/image.h>
 #include <lumihull/calib/color_key.h>
+#include <lumihull/calib/detect_targets.h>
 #include <lumihull/hull/mesh.h>
 #include <lumihull/hull/ray_scene.h>
 
@@ -28,4 +29,12 @@ struct lh_ray_scene {
 
 struct lh_capture {
   lumihull::Capture value;
+};
+
+struct lh_target_detector {
+  lumihull::calib::TargetDetector value;
+};
+
+struct lh_detections {
+  lumihull::calib::Detections value;
 };

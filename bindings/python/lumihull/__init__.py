@@ -14,6 +14,8 @@ from ._lumihull import NO_HIT as NO_HIT
 from ._lumihull import Camera as Camera
 from ._lumihull import Capture as Capture
 from ._lumihull import ColorKey as ColorKey
+from ._lumihull import Detection as Detection
+from ._lumihull import Detections as Detections
 from ._lumihull import Error as Error
 from ._lumihull import Image as Image
 from ._lumihull import Mesh as Mesh
@@ -21,9 +23,11 @@ from ._lumihull import MeshCheck as MeshCheck
 from ._lumihull import Pose as Pose
 from ._lumihull import Progress as Progress
 from ._lumihull import RayScene as RayScene
+from ._lumihull import RefusedTarget as RefusedTarget
 from ._lumihull import Renderer as Renderer
 from ._lumihull import Rendering as Rendering
 from ._lumihull import StageResult as StageResult
+from ._lumihull import TargetDetector as TargetDetector
 from ._lumihull import View as View
 from ._lumihull import __version__ as __version__
 from ._lumihull import carve as carve
