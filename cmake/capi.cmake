@@ -1,6 +1,6 @@
 # The C API's library, and the baseline that its binary interface is held against.
 
-# lumihull_c_library(FOLDER SOURCES file…): liblumihull.so from FOLDER/src, header FOLDER/include/lumihull.h, exported as
+# lumihull_c_library(FOLDER SOURCES file…): liblumihull.so from FOLDER/src, headers FOLDER/include/*.h, exported as
 # lumihull::capi. Only what FOLDER/lumihull.map lists leaves it.
 function(lumihull_c_library folder)
   cmake_parse_arguments(arg "" "" "SOURCES" ${ARGN})
@@ -8,7 +8,8 @@ function(lumihull_c_library folder)
   set(map ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/lumihull.map)
   add_library(lumihull_capi SHARED ${arg_SOURCES})
   add_library(lumihull::capi ALIAS lumihull_capi)
-  target_sources(lumihull_capi PUBLIC FILE_SET HEADERS BASE_DIRS ${folder}/include FILES ${folder}/include/lumihull.h)
+  file(GLOB headers CONFIGURE_DEPENDS ${folder}/include/*.h)
+  target_sources(lumihull_capi PUBLIC FILE_SET HEADERS BASE_DIRS ${folder}/include FILES ${headers})
   target_include_directories(lumihull_capi PRIVATE ${folder}/src ${PROJECT_SOURCE_DIR}/libcapture/base/internal)
   target_compile_features(lumihull_capi PRIVATE cxx_std_20)
   target_compile_definitions(lumihull_capi PRIVATE LUMIHULL_VERSION="${PROJECT_VERSION}")

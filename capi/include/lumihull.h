@@ -588,4 +588,6 @@ LH_API lh_status lh_mask_iou(lh_context *ctx, const uint8_t *a, const uint8_t *b
 }
 #endif
 
+#include <lumihull_calib.h> /* targets, resection, lens calibration */
+
 #endif

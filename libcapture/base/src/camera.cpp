@@ -2,6 +2,7 @@
 #include <lumihull/base/error.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -110,6 +111,12 @@ Vector2d Camera::correct(const Vector2d& d, Matrix2d* jacobian) const {
 
 double Camera::domain_radius() const {
   if (!has_distortion()) return std::numeric_limits<double>::infinity();
+  // Asked point by point for one lens: the last answer is kept.
+  using Lens = std::array<double, 5>;
+  thread_local Lens last{};
+  thread_local double last_radius = 0;
+  const Lens lens{k1, k2, k3, p1, p2};
+  if (lens == last) return last_radius;
   // Beyond this radius the highest term rules and its sign decides; a fold, if there is one, lies before it.
   constexpr double kFar = 20;  // 87 degrees off the axis
   constexpr int kAngles = 128;
@@ -117,7 +124,9 @@ double Camera::domain_radius() const {
   const bool radial_only = p1 == 0 && p2 == 0;
   for (int i = 0; i < (radial_only ? 1 : kAngles); ++i)
     radius = std::min(radius, first_fold(*this, 2 * std::numbers::pi * i / kAngles, radius));
-  return radius < kFar ? radius : std::numeric_limits<double>::infinity();
+  last = lens;
+  last_radius = radius < kFar ? radius : std::numeric_limits<double>::infinity();
+  return last_radius;
 }
 
 std::optional<Vector2d> Camera::distort(const Vector2d& corrected, Matrix2d* jacobian) const {
@@ -176,7 +185,13 @@ bool Camera::project_with_parameter_jacobian(const Vector3d& point, Vector2d* pi
   const auto d = distort(c, &lens);
   if (!d) return false;
   if (pixel) *pixel = pixel_from_distorted(*d);
-  if (by_point) project(point, by_point);
+  if (by_point) {
+    Matrix2d to_pixel;
+    to_pixel << s * f, skew, 0, f;
+    Matrix23d normalise;
+    normalise << inverse_z, 0, -c.x() * inverse_z, 0, inverse_z, -c.y() * inverse_z;
+    *by_point = to_pixel * lens * normalise;
+  }
   if (by_parameters) {
     const double x = d->x(), y = d->y(), r2 = d->squaredNorm();
     // d + F(d, k) = c with c fixed: (I + dF/dd) dd + dF/dk = 0, so dd/dk = -lens * dF/dk.

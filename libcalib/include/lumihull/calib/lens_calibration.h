@@ -41,7 +41,7 @@ struct LUMIHULL_API LensCalibrationOptions {
   /// Which parameters are estimated. The default: f, s = 1 fixed (square pixels), no skew, u0, v0, k1, k2, p1, p2.
   std::array<bool, kIntrinsics> free{true, false, false, true, true, true, true, false, true, true};
   /// Start for all parameters, and the value of those that are fixed; without: closed form, fixed ones 1 for s and 0.
-  std::optional<Camera> start;
+  std::optional<Camera> start = std::nullopt;
   bool robust = true;        ///< Cauchy loss, then outliers are left out and named
   double outlier_sigma = 4;  ///< standard deviations (2-D), scaled by sigma0
   int max_iterations = 100;

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <lumihull/base/job.h>
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "grey_pyramid.h"
+
+namespace lumihull::calib {
+
+/// A dark spot that may be a circle's picture: an ellipse by the moments of its outline, filled.
+struct Blob {
+  Eigen::Vector2d center{0, 0};  ///< px of the photograph
+  /// (x - center)ᵀ shape⁻¹ (x - center) = 1 on the contour, px².
+  Eigen::Matrix2d shape = Eigen::Matrix2d::Identity();
+  double a = 0, b = 0;  ///< semi-axes, px, a >= b
+  float dark = 0, light = 0;  ///< grey values about it
+  int level = 0;              ///< of the pyramid, where it was found
+};
+
+struct BlobOptions {
+  double min_circle_px = 4.5;  ///< smallest minor axis (full), px of the photograph
+  int min_contrast = 12;       ///< grey values
+  bool two_valued = false;     ///< the pyramid comes from a key: no noise
+};
+
+/// Dark ellipses of all sizes. Each level is thresholded halfway between the smallest and the largest value of 3 x 3 tiles
+/// of 8 x 8 px, where these differ by more than noise does, and looked through for spots of 4 to 40 px: so that a circle of
+/// any size is seen where the threshold is as local as the circle is small. What two levels see is kept once. Ordered by
+/// level, then by place; does not depend on the number of threads.
+std::vector<Blob> find_blobs(const GreyPyramid& pyramid, const BlobOptions& options, Job& job);
+
+}  // namespace lumihull::calib

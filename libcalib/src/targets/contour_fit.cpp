@@ -1,0 +1,255 @@
+// Least squares of a blurred ellipse to a set of pixels.
+#include "contour_fit.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace lumihull::calib {
+namespace {
+
+constexpr int kSize = ContourModel::kSize;
+// The light's relative change over a pixel, a priori: 15 % over a thousand pixels, with the tails of a Cauchy distribution,
+// so that where the picture shows more it is believed.
+constexpr double kLightChange = 1.5e-4;
+constexpr double kRatioSd = 0.03;  // of a ring's ratio, a priori: ink spreads
+constexpr int kFlush = 32;         // blocks that are summed in float
+
+}  // namespace
+
+void ContourFit::gather(const Ellipse& ellipse, const BandWidth& band, int sectors) {
+  blocks_.clear();
+  sectors_.assign(std::size_t(sectors), {});
+  gathered_ = 0;
+  std::array<Block, BlurredEllipse::kSides> open{};
+  const UnitFrame frame(ellipse);
+  const double per_radian = sectors / (2 * std::numbers::pi);
+  const auto close = [&](Block& block) {
+    BlurredEllipse::Pixels& p = block.pixels;
+    for (int i = block.count; i < kLanes; ++i) p.x[i] = p.x[0], p.y[i] = p.y[0];
+    p.low_x = p.high_x = p.x[0];
+    p.low_y = p.high_y = p.y[0];
+    for (int i = 1; i < kLanes; ++i) {
+      p.low_x = std::min(p.low_x, p.x[i]), p.high_x = std::max(p.high_x, p.x[i]);
+      p.low_y = std::min(p.low_y, p.y[i]), p.high_y = std::max(p.high_y, p.y[i]);
+    }
+    blocks_.push_back(block);
+    block.count = 0;
+  };
+  const PixelBox box{0, 0, plane_.values.width(), plane_.values.height()};
+  for_each_in_band(ellipse, frame, band, box, [&](int x, int y, const Eigen::Vector2d& v, double) {
+    const float value = plane_.values.row<float>(y)[x];
+    if (!std::isfinite(value)) return;
+    const Eigen::Vector2d normal = frame.inverse * v;
+    const auto side = std::abs(normal.x()) >= std::abs(normal.y())
+                          ? (normal.x() > 0 ? BlurredEllipse::right : BlurredEllipse::left)
+                          : (normal.y() > 0 ? BlurredEllipse::bottom : BlurredEllipse::top);
+    Block& block = open[std::size_t(side)];
+    if (block.count == 0) block = Block{}, block.pixels.side = side;
+    const int lane = block.count++;
+    block.pixels.x[lane] = float(x + 0.5 - origin_.x());
+    block.pixels.y[lane] = float(y + 0.5 - origin_.y());
+    block.value[lane] = value;
+    const double angle = std::atan2(v.y(), v.x()) + std::numbers::pi;
+    block.sector[std::size_t(lane)] = std::uint8_t(std::min(sectors - 1, int(angle * per_radian)));
+    ++gathered_;
+    if (block.count == kLanes) close(block);
+  });
+  for (Block& block : open)
+    if (block.count > 0) close(block);
+}
+
+template <class Body>
+void ContourFit::for_each_residual(const ContourModel& model, Body&& body) {
+  share_.set(model.center(), model.root(), model.p[ContourModel::blur], ring_ ? model.p[ContourModel::ratio] : 0);
+  BlurredEllipse::Share share;
+  const Lanes gx = all(float(model.p[ContourModel::light_x] / unit_)), gy = all(float(model.p[ContourModel::light_y] / unit_));
+  // The light falls on the print before it is blurred: ∫ f(q) (1 + g·q) G(q - p) dq = (1 + g·p) w + s² g·∇w.
+  const Lanes spread = all(float(model.p[ContourModel::blur] * model.p[ContourModel::blur]));
+  const Lanes outside = all(float(model.p[ContourModel::outside])), step = all(float(model.p[ContourModel::step]));
+  for (Block& block : blocks_) {
+    share_.evaluate(block.pixels, share);
+    const Lanes light = all(1) + gx * block.pixels.x + gy * block.pixels.y;
+    const Lanes plain = outside + step * share.w;
+    block.expected = plain * light - step * spread * (gx * share.by_center[0] + gy * share.by_center[1]);
+    const Lanes slope2 = share.by_center[0] * share.by_center[0] + share.by_center[1] * share.by_center[1];
+    for (int i = 0; i < kLanes; ++i) block.slope[i] = step[i] * std::sqrt(slope2[i]);
+    body(block, share, light, plain, block.value - block.expected);
+  }
+}
+
+void ContourFit::expect(const ContourModel& model, double inner_ratio) {
+  ring_ = inner_ratio > 0;
+  for_each_residual(model, [](const Block&, const BlurredEllipse::Share&, const Lanes&, const Lanes&, const Lanes&) {});
+}
+
+void ContourFit::weigh() {
+  pixels_ = clipped_ = 0;
+  for (Block& block : blocks_)
+    for (int i = 0; i < kLanes; ++i) {
+      const double v = double(block.expected[i]), variance = std::max(1e-14, plane_.noise.variance(v));
+      // By the model, not only by the value: to leave out those that noise has lifted would pull the level down.
+      const bool clipped = block.value[i] >= plane_.saturation || v > double(plane_.saturation) - 2 * std::sqrt(variance);
+      const bool counts = i < block.count && !clipped && sectors_[block.sector[std::size_t(i)]].used;
+      block.variance[i] = float(variance);
+      block.weight[i] = counts ? float(1 / variance) : 0.0f;
+      pixels_ += counts;
+      clipped_ += i < block.count && clipped;
+    }
+}
+
+double ContourFit::evaluate(const ContourModel& model, double robust, ContourModel::Matrix* normal,
+                            ContourModel::Vector* right) {
+  constexpr int kPairs = kSize * (kSize + 1) / 2;
+  std::array<Lanes, kPairs + kSize + 1> sums{};
+  ContourModel::Matrix h = ContourModel::Matrix::Zero();
+  ContourModel::Vector b = ContourModel::Vector::Zero();
+  double squares = 0;
+  const int size = ring_ ? kSize : kSize - 1;
+  const auto flush = [&] {
+    std::size_t k = 0;
+    const auto total = [&](std::size_t i) {
+      double sum = 0;
+      for (int l = 0; l < kLanes; ++l) sum += double(sums[i][l]);
+      sums[i] = all(0);
+      return sum;
+    };
+    for (int i = 0; i < size; ++i)
+      for (int j = 0; j <= i; ++j) h(i, j) += total(k++);
+    for (int i = 0; i < size; ++i) b[i] += total(std::size_t(kPairs + i));
+    squares += total(kPairs + kSize);
+  };
+  const Lanes per_unit = all(float(1 / unit_)), step = all(float(model.p[ContourModel::step]));
+  const Lanes spread = step * all(float(model.p[ContourModel::blur] * model.p[ContourModel::blur]));
+  const Lanes limit = all(robust > 0 ? float(1 / (robust * robust)) : 0.0f);
+  int since = 0;
+  for_each_residual(model, [&](Block& block, const BlurredEllipse::Share& share, const Lanes& light, const Lanes& plain,
+                               const Lanes& residual) {
+    const Lanes scaled = residual * residual * block.weight, damping = all(1) / (all(1) + limit * scaled);
+    sums[kPairs + kSize] += scaled * damping;
+    const Lanes weight = block.weight * damping * damping, by_share = step * light;
+    const Lanes slope[kSize] = {by_share * share.by_center[0], by_share * share.by_center[1],
+                                by_share * share.by_root[0],   by_share * share.by_root[1],
+                                by_share * share.by_root[2],   by_share * share.by_s,
+                                light,                         light * share.w,
+                                (plain * block.pixels.x - spread * share.by_center[0]) * per_unit,
+                                (plain * block.pixels.y - spread * share.by_center[1]) * per_unit,
+                                by_share * share.by_ratio};
+    std::size_t k = 0;
+    for (int i = 0; i < size; ++i) {
+      const Lanes weighted = weight * slope[i];
+      for (int j = 0; j <= i; ++j) sums[k++] += weighted * slope[j];
+      sums[std::size_t(kPairs + i)] += weighted * residual;
+    }
+    if (++since == kFlush) flush(), since = 0;
+  });
+  flush();
+  if (normal) *normal = h.selfadjointView<Eigen::Lower>();
+  if (right) *right = b;
+  return squares;
+}
+
+bool ContourFit::solve(ContourModel& model, int max_iterations, double converged, double robust,
+                       double inner_ratio) {
+  using Vector = ContourModel::Vector;
+  using Matrix = ContourModel::Matrix;
+  ring_ = inner_ratio > 0;
+  const double least_blur = 0.3, most_blur = std::min(std::max(0.85 * unit_, 1.0), std::max(2.6, 0.3 * unit_));
+  const double size = model.root().determinant();
+  const auto with_prior = [&](const ContourModel& m, double squares, Matrix* h, Vector* b) {
+    const Eigen::Vector2d light = m.p.segment<2>(ContourModel::light_x);
+    const double expected = kLightChange * kLightChange * unit_ * unit_, spread = expected + light.squaredNorm();
+    if (h) {
+      h->diagonal().segment<2>(ContourModel::light_x).array() += 1 / spread;
+      b->segment<2>(ContourModel::light_x) -= light / spread;
+    }
+    squares += std::log(spread / expected);
+    constexpr int kRatio = ContourModel::ratio;
+    const double weight = ring_ ? 1 / (kRatioSd * kRatioSd) : 1, off = ring_ ? m.p[kRatio] - inner_ratio : 0;
+    if (h) (*h)(kRatio, kRatio) += weight, (*b)[kRatio] -= weight * off;
+    squares += weight * off * off;
+    return squares;
+  };
+  Matrix h;
+  Vector b;
+  double squares = evaluate(model, robust, &h, &b), lambda = 1e-3;
+  double loss = with_prior(model, squares, &h, &b);
+  bool current = true;  // what is expected is the model's
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    Matrix damped = h;
+    damped.diagonal() *= 1 + lambda;
+    const Eigen::LDLT<Matrix> solver(damped);
+    const Vector step = solver.solve(b);
+    if (solver.info() != Eigen::Success || !step.allFinite()) return false;
+    ContourModel next = model;
+    next.p += step;
+    next.p[ContourModel::blur] = std::clamp(next.p[ContourModel::blur], least_blur, most_blur);
+    next.p[ContourModel::ratio] = std::clamp(next.p[ContourModel::ratio], 0.05, 0.95);
+    const double next_size = next.root().determinant();
+    bool better = next_size > 0.1 * size && next_size < 10 * size && next.root().trace() > 0 &&
+                  next.center().norm() < 2 * unit_ + 10;
+    Matrix next_h;
+    Vector next_b;
+    if (better) {
+      current = false;
+      const double next_squares = evaluate(next, robust, &next_h, &next_b);
+      const double next_loss = with_prior(next, next_squares, &next_h, &next_b);
+      better = next_loss <= loss * (1 + 1e-6);
+      if (better) {
+        const double moved = step.dot(h * step);
+        current = true;
+        model = next;
+        squares = next_squares;
+        loss = next_loss;
+        h = next_h;
+        b = next_b;
+        lambda = std::max(1e-7, lambda * 0.1);
+        if (moved < converged) break;
+        continue;
+      }
+    }
+    if (step.dot(h * step) < converged) break;
+    lambda *= 10;
+    if (lambda > 1e6) break;
+  }
+  if (!current) expect(model, inner_ratio);
+  squares_ = squares;
+  information_ = h;
+  return std::isfinite(squares);
+}
+
+void ContourFit::measure_sectors(double tolerance) {
+  for (Sector& s : sectors_) s.pixels = 0, s.squares = s.shift = s.shift_sd_px = 0;
+  const float play = float(tolerance * tolerance);
+  for (const Block& block : blocks_)
+    for (int i = 0; i < block.count; ++i) {
+      if (block.value[i] >= plane_.saturation) continue;
+      Sector& s = sectors_[block.sector[std::size_t(i)]];
+      const float residual = block.value[i] - block.expected[i];
+      ++s.pixels;
+      const float weight = 1 / (block.variance[i] + play);
+      s.squares += double(residual * residual * weight);
+      s.shift += double(residual * block.slope[i] * weight);
+      s.shift_sd_px += double(block.slope[i] * block.slope[i] * weight);
+    }
+  for (Sector& s : sectors_) {
+    s.shift_sd_px = 1 / std::sqrt(std::max(1e-30, s.shift_sd_px));
+    s.shift *= s.shift_sd_px;
+  }
+}
+
+double ContourFit::robust_scale() {
+  scratch_.clear();
+  for (const Block& block : blocks_)
+    for (int i = 0; i < block.count; ++i)
+      if (block.value[i] < plane_.saturation)
+        scratch_.push_back(std::abs(block.value[i] - block.expected[i]) / std::sqrt(block.variance[i]));
+  if (scratch_.empty()) return 0;
+  const auto middle = scratch_.begin() + std::ptrdiff_t(scratch_.size() / 2);
+  std::nth_element(scratch_.begin(), middle, scratch_.end());
+  return double(*middle) / 0.6745;
+}
+
+}  // namespace lumihull::calib
