@@ -11,9 +11,9 @@ namespace lumihull::calib {
 namespace {
 
 constexpr int kSize = ContourModel::kSize;
-// The light's relative change over a pixel, a priori: 15 % over a thousand pixels, with the tails of a Cauchy distribution,
+// The light's relative change over a pixel, a priori: 10 % over a thousand pixels, with the tails of a Cauchy distribution,
 // so that where the picture shows more it is believed.
-constexpr double kLightChange = 1.5e-4;
+constexpr double kLightChange = 1e-4;
 constexpr double kRatioSd = 0.03;  // of a ring's ratio, a priori: ink spreads
 constexpr int kFlush = 32;         // blocks that are summed in float
 
@@ -221,12 +221,15 @@ bool ContourFit::solve(ContourModel& model, int max_iterations, double converged
 }
 
 void ContourFit::measure_sectors(double tolerance) {
-  for (Sector& s : sectors_) s.pixels = 0, s.squares = s.shift = s.shift_sd_px = 0;
+  for (Sector& s : sectors_) s.pixels = s.clipped = 0, s.squares = s.shift = s.shift_sd_px = 0;
   const float play = float(tolerance * tolerance);
   for (const Block& block : blocks_)
     for (int i = 0; i < block.count; ++i) {
-      if (block.value[i] >= plane_.saturation) continue;
       Sector& s = sectors_[block.sector[std::size_t(i)]];
+      if (block.value[i] >= plane_.saturation) {
+        ++s.clipped;
+        continue;
+      }
       const float residual = block.value[i] - block.expected[i];
       ++s.pixels;
       const float weight = 1 / (block.variance[i] + play);

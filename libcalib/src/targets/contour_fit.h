@@ -36,7 +36,7 @@ class ContourFit {
   static constexpr int kMaxSectors = 64;
 
   struct Sector {
-    int pixels = 0;
+    int pixels = 0, clipped = 0;
     double squares = 0;  ///< Σ residual² / (variance + tolerance²)
     /// How far the contour lies outward of where it should, in standard deviations, and of how many px one is.
     double shift = 0, shift_sd_px = 0;

@@ -16,7 +16,7 @@ namespace lumihull::calib {
 ///
 /// and dF/dx the same of A1, dF/dσ = σ d²F/dx² (the heat equation), the same of A0.
 ///
-/// Tabulated once for a blur and a direction, then interpolated (Hermite; F to 1e-7): an edge has many pixels.
+/// Tabulated once for a blur and a direction, then interpolated (Hermite; F to 1e-5): an edge has many pixels.
 class EdgeProfile {
  public:
   struct Value {

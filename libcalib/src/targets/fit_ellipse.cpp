@@ -72,7 +72,11 @@ bool judge_sectors(std::vector<ContourFit::Sector>& sectors) {
   for (std::size_t i = 0; i < sectors.size(); ++i) {
     const ContourFit::Sector& s = sectors[i];
     const double shift_limit = kSectorSigma * std::sqrt(common) + kShiftTolerance / s.shift_sd_px;
-    bad[i] = s.pixels == 0 || s.squares > common * s.pixels * chi_square_limit(s.pixels, kSectorSigma) ||
+    if (s.pixels == 0) {  // at a thin ellipse's ends sectors may be narrower than a pixel
+      bad[i] = s.clipped > 0;
+      continue;
+    }
+    bad[i] = s.squares > common * s.pixels * chi_square_limit(s.pixels, kSectorSigma) ||
              std::abs(s.shift) > shift_limit;
   }
   bool changed = false;
@@ -178,7 +182,8 @@ EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const Elli
   if (pixels.clipped() > options.max_saturated * pixels.gathered()) fit.state = EllipseState::saturated;
   else if (step < options.min_contrast_noise * noise) fit.state = EllipseState::no_contrast;
   else if (fit.visible < options.min_visible) fit.state = EllipseState::occluded;
-  else if (variance_ratio > 2 + tolerated * tolerated) fit.state = EllipseState::no_fit;
+  else if (fit.visible < 0.95 ? variance_ratio > 1.4 + 0.25 * tolerated * tolerated  // what is left must be right
+                              : variance_ratio > 2 + tolerated * tolerated) fit.state = EllipseState::no_fit;
   else fit.state = EllipseState::good;
   return fit;
 }

@@ -16,7 +16,9 @@ using Vector = Eigen::Matrix<double, kParameters, 1>;
 using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
 
 constexpr double kLeastBlur = 0.15, kMostBlur = 8;
+constexpr double kFar = 4;  // standard deviations from where on a blurred edge is not felt
 constexpr double kPixelVariance = 1.0 / 12;  // of a pixel's box along a line
+constexpr double kRest = 1e-4;  // px: a step below which the iteration ends (it converges faster than linearly)
 constexpr double kOutlier = 4;  // a part's chi² a pixel over the side's median, from where on it is left out
 
 double normal_cdf(double z) { return 0.5 * std::erfc(-z * 0.70710678118654752440); }
@@ -27,6 +29,7 @@ struct Sample {
   double window;  ///< the corners' part: share of the dark that the neighbouring sides leave
   double behind;  ///< share of light that leaks in from the cells behind the border
   int part;
+  double weight = 1;  ///< 1 / variance
 };
 
 double bilinear(const Image& values, double x, double y) {
@@ -45,12 +48,12 @@ double leak(const CellsBehind& behind, double half_length, double u, double d, d
   double sum = 0;
   for (std::size_t row = 0; row < 2; ++row) {
     const auto &upper = behind.corners[row], &lower = behind.corners[row + 1];
-    if (behind.light[row] == 0 || (d - upper.front().y()) > 5 * s) continue;
+    if (behind.light[row] == 0 || d - std::max(upper.front().y(), upper.back().y()) > kFar * s) continue;
     for (int i = 0; i < behind.columns; ++i) {
       if (!(behind.light[row] >> i & 1)) continue;
       const std::size_t k = std::size_t(i);
       const double from = half_length * (upper[k].x() - u), to = half_length * (upper[k + 1].x() - u);
-      if (from > 5 * s || to < -5 * s) continue;
+      if (from > kFar * s || to < -kFar * s) continue;
       const double top = 0.5 * (upper[k].y() + upper[k + 1].y()) - d, bottom = 0.5 * (lower[k].y() + lower[k + 1].y()) - d;
       sum += (normal_cdf(to / s) - normal_cdf(from / s)) * (normal_cdf(top / s) - normal_cdf(bottom / s));
     }
@@ -92,7 +95,7 @@ std::vector<Sample> samples_of(const LightPlane& plane, const SideCurve& side, c
       if (std::abs(s) > half - trim || x < -inner || x > outer) continue;
       const double value = double(plane.values.row<float>(major == 0 ? j : i)[major == 0 ? i : j]);
       if (!std::isfinite(value)) continue;
-      const double window = normal_cdf((half + s) / spread) * normal_cdf((half - s) / spread);
+      const double window = half - std::abs(s) > kFar * spread ? 1 : normal_cdf((half + s) / spread) * normal_cdf((half - s) / spread);
       samples.push_back({u, d, value, window, behind.known() ? leak(behind, half, u, d, blur) : 0,
                          std::min(parts - 1, int((s + half - trim) / part_px))});
     }
@@ -100,9 +103,10 @@ std::vector<Sample> samples_of(const LightPlane& plane, const SideCurve& side, c
   return samples;
 }
 
+/// Value and derivatives of one pixel by the side's parameters.
 struct Model {
   double value;
-  Vector gradient;
+  std::array<double, kParameters> gradient;
 };
 
 class SideModel {
@@ -111,17 +115,15 @@ class SideModel {
       : p_(p), profile_(side.normal(), p[7]), slope_(light_slope) {}
 
   Model at(const Sample& s) const {
-    const Eigen::Vector3d basis = SideCurve::basis(s.u);
-    const EdgeProfile::Value f = profile_.at(s.d - p_.head<3>().dot(basis));
+    const double bend = s.u * s.u - 1.0 / 3;  // SideCurve::basis
+    const EdgeProfile::Value f = profile_.at(s.d - (p_[0] + p_[1] * s.u + p_[2] * bend));
     const double share = 1 - (1 - f.share) * s.window + s.behind;
     const double shade = 1 + slope_ * s.d;
-    const double dark = (p_[3] + p_[4] * s.u) * shade, light = (p_[5] + p_[6] * s.u) * shade;
-    Model m;
-    m.value = dark + (light - dark) * share;
-    const double by_x = (light - dark) * s.window * f.by_x;
-    m.gradient << -by_x * basis, (1 - share) * shade, (1 - share) * shade * s.u, share * shade, share * shade * s.u,
-        (light - dark) * s.window * f.by_sigma;
-    return m;
+    const double dark = (p_[3] + p_[4] * s.u) * shade, step = (p_[5] + p_[6] * s.u) * shade - dark;
+    const double by_place = -step * s.window * f.by_x, by_light = share * shade, by_dark = shade - by_light;
+    return {dark + step * share,
+            {by_place, by_place * s.u, by_place * bend, by_dark, by_dark * s.u, by_light, by_light * s.u,
+             step * s.window * f.by_sigma}};
   }
 
  private:
@@ -139,20 +141,24 @@ struct Normal {
 
 /// Normal equations of the band's pixels, and the priors': curvature, slopes of the levels (to 30 % a side, so that sides
 /// of few pixels stay determined), what the other sides say.
-Normal normal_equations(const LightPlane& plane, const SideCurve& side, const SideBand& band,
-                        const std::vector<Sample>& samples, const std::vector<char>& used, const Vector& p) {
+Normal normal_equations(const SideCurve& side, const SideBand& band, const std::vector<Sample>& samples, const std::vector<char>& used, const Vector& p) {
   Normal n;
   const SideModel model(side, p, band.light_slope);
+  alignas(32) double a[kParameters][kParameters] = {}, b[kParameters] = {};
   for (const Sample& s : samples) {
     if (!used[std::size_t(s.part)]) continue;
     const Model m = model.at(s);
-    const double weight = 1 / plane.noise.variance(m.value), r = s.value - m.value;
-    n.a.selfadjointView<Eigen::Lower>().rankUpdate(m.gradient, weight);
-    n.b += weight * r * m.gradient;
+    const double weight = s.weight, r = s.value - m.value;
+    for (std::size_t i = 0; i < kParameters; ++i) {
+      const double g = weight * m.gradient[i];
+      for (std::size_t j = 0; j < kParameters; ++j) a[i][j] += g * m.gradient[j];
+      b[i] += g * r;
+    }
     n.chi2 += weight * r * r;
     ++n.count;
   }
-  n.a.triangularView<Eigen::StrictlyUpper>() = n.a.transpose();
+  n.a = Eigen::Map<Matrix>(&a[0][0]);
+  n.b = Eigen::Map<Vector>(b);
   const auto prior = [&](int k, double sd, double mean = 0) {
     const double weight = 1 / (sd * sd), off = p[k] - mean;
     n.a(k, k) += weight;
@@ -188,11 +194,26 @@ bool start_levels(const SideCurve& side, const SideBand& band, const std::vector
   return levels[1] > levels[0];
 }
 
+/// Each pixel's variance: its noise, and what the model leaves besides: lenses, sharpening and paper are not as it says.
+void weigh(const LightPlane& plane, const SideCurve& side, const SideBand& band, const std::vector<char>& used,
+           const Vector& p, std::vector<Sample>& samples) {
+  const SideModel model(side, p, band.light_slope);
+  double excess = 0;
+  int count = 0;
+  for (Sample& s : samples) {
+    const double v = model.at(s).value, r = s.value - v, noise = plane.noise.variance(v);
+    s.weight = noise;
+    if (used[std::size_t(s.part)]) excess += r * r - noise, ++count;
+  }
+  excess = count > 0 ? std::max(0.0, excess / count) : 0;
+  for (Sample& s : samples) s.weight = 1 / (s.weight + excess);
+}
+
 /// Levenberg-Marquardt; false where it does not come to rest near its start.
-bool iterate(const LightPlane& plane, const SideCurve& side, const SideBand& band, const std::vector<Sample>& samples,
+bool iterate(const SideCurve& side, const SideBand& band, const std::vector<Sample>& samples,
              const std::vector<char>& used, Vector& p, Normal& n) {
-  n = normal_equations(plane, side, band, samples, used, p);
-  double damping = 1e-4;
+  n = normal_equations(side, band, samples, used, p);
+  double damping = 1e-6;
   for (int i = 0; i < 20; ++i) {
     Matrix a = n.a;
     a.diagonal() *= 1 + damping;
@@ -200,28 +221,33 @@ bool iterate(const LightPlane& plane, const SideCurve& side, const SideBand& ban
     if (!step.allFinite()) return false;
     Vector next = p + step;
     next[7] = std::clamp(next[7], kLeastBlur, kMostBlur);
-    const Normal m = normal_equations(plane, side, band, samples, used, next);
-    if (m.chi2 <= n.chi2 * (1 + 1e-12)) {
+    // So small a step needs no look at where it leads.
+    const bool small = (next - p).head<3>().cwiseAbs().maxCoeff() < kRest && std::abs(next[7] - p[7]) < 10 * kRest;
+    if (small && damping < 1e-3) {
+      p = next;
+      return true;
+    }
+    const Normal m = normal_equations(side, band, samples, used, next);
+    if (m.chi2 <= n.chi2) {
       p = next, n = m;
       damping = std::max(1e-9, 0.1 * damping);
-      if (step.head<3>().cwiseAbs().maxCoeff() < 1e-5 && std::abs(step[7]) < 1e-4) return true;
     } else {
-      damping *= 10;
-      if (damping > 1e6) return true;
+      damping = std::max(1e-4, damping * 10);
+      if (damping > 1e4) return true;
     }
   }
   return true;
 }
 
 /// Leaves out parts of the side that do not look like the rest of it. Returns how many went.
-int drop_disturbed(const LightPlane& plane, const SideCurve& side, const SideBand& band,
-                   const std::vector<Sample>& samples, std::vector<char>& used, const Vector& p) {
+int drop_disturbed(const SideCurve& side, const SideBand& band, const std::vector<Sample>& samples,
+                   std::vector<char>& used, const Vector& p) {
   std::vector<double> chi2(used.size(), 0);
   std::vector<int> count(used.size(), 0);
   const SideModel model(side, p, band.light_slope);
   for (const Sample& s : samples) {
-    const double v = model.at(s).value, r = s.value - v;
-    chi2[std::size_t(s.part)] += r * r / plane.noise.variance(v);
+    const double r = s.value - model.at(s).value;
+    chi2[std::size_t(s.part)] += r * r * s.weight;
     ++count[std::size_t(s.part)];
   }
   std::vector<double> all;
@@ -328,14 +354,18 @@ std::optional<SideFit> fit_side(const LightPlane& plane, const SideCurve& start,
     if (samples.size() < 3 * kParameters) return std::nullopt;
     used.assign(std::size_t(parts), 1);
     if (round == 0 && !start_levels(side, band, samples, p)) return std::nullopt;
-    if (!iterate(plane, side, band, samples, used, p, n)) return std::nullopt;
+    weigh(plane, side, band, used, p, samples);
+    if (!iterate(side, band, samples, used, p, n)) return std::nullopt;
     if ((p.head<3>() - start.c).cwiseAbs().maxCoeff() > 2) return std::nullopt;
-    if (round > 0 && std::abs(p[7] - blur) < 0.02 * p[7] + 0.005) break;
+    if ((round > 0 || band.expected) && std::abs(p[7] - blur) < 0.02 * p[7] + 0.005) break;
   }
-  for (int round = 0; round < 2 && drop_disturbed(plane, side, band, samples, used, p) > 0; ++round) {
+  weigh(plane, side, band, used, p, samples);
+  while (drop_disturbed(side, band, samples, used, p) > 0) {
     if (std::count(used.begin(), used.end(), 1) < 0.5 * double(used.size())) return std::nullopt;
-    if (!iterate(plane, side, band, samples, used, p, n)) return std::nullopt;
+    if (!iterate(side, band, samples, used, p, n)) return std::nullopt;
+    weigh(plane, side, band, used, p, samples);
   }
+  if (!iterate(side, band, samples, used, p, n)) return std::nullopt;
   if (n.count < 2 * kParameters || !(p[5] > p[3])) return std::nullopt;
   if ((p.head<3>() - start.c).cwiseAbs().maxCoeff() > 2) return std::nullopt;
 
