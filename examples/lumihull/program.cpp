@@ -130,6 +130,7 @@ int Program::run(int argc, char** argv) {
   add_export(*this);
   add_info(*this);
   add_intrinsics(*this);
+  add_targets(*this);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

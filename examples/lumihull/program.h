@@ -87,5 +87,6 @@ void add_evaluate(Program& program);
 void add_run(Program& program);
 void add_info(Program& program);
 void add_intrinsics(Program& program);
+void add_targets(Program& program);
 
 }  // namespace lumihull::program
