@@ -124,9 +124,10 @@ TargetDesign design_of(const Arguments& a) {
 /// "chessboard:9x6:25mm", or without the size: as large as fits.
 PointGrid parse_board(const Arguments& a) {
   const bool sized = std::count(a.board.begin(), a.board.end(), ':') >= 2;
-  const TargetSet set = TargetSet::from_word(sized ? a.board : a.board + ":1mm");
-  if (set.grids.size() != 1 || !set.designs.empty())
+  if ((!a.board.starts_with("chessboard:") && !a.board.starts_with("circles:")) ||
+      a.board.find(',') != std::string::npos)
     throw Error(ErrorCode::invalid_argument, "expected chessboard:9x6:25mm or circles:11x8:15mm", "--board");
+  const TargetSet set = TargetSet::from_word(sized ? a.board : a.board + ":1mm");
   PointGrid grid = set.grids[0];
   if (!sized) grid.spacing_m = 0;
   if (!a.circle.empty()) grid.circle_diameter_m = parse_length(a.circle, "--circle");
