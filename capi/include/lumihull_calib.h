@@ -11,6 +11,142 @@
 extern "C" {
 #endif
 
+/* ---- families of targets ----------------------------------------------------------------------------------------- */
+
+#define LH_TARGETS_CIRCLES 0
+#define LH_TARGETS_SQUARES 1
+
+#define LH_CELL_DARK 0
+#define LH_CELL_LIGHT 1
+#define LH_CELL_UNKNOWN 2
+
+/** What a family of coded targets is: "paper4x4", "matrix5x5", "matrix6x6" (circles on a grid; the left column and the
+ *  bottom row are dark, the others hold the id), "apriltag:36h11", …, "aruco:6x6_250", … (squares). */
+typedef struct lh_target_family {
+  size_t struct_size;
+  int32_t kind;             /**< LH_TARGETS_… */
+  int32_t grid;             /**< cells along a side; squares: with the black border */
+  int32_t id_count;
+  int32_t minimum_distance; /**< cells in which two ids differ at least, one of them turned by 0 to 3 quarters */
+} lh_target_family;
+
+/** What was read from cells. */
+typedef struct lh_decoded_target {
+  size_t struct_size;
+  int32_t id;            /**< -1: no id, or more than one, is near enough */
+  int32_t quarter_turns; /**< clockwise turns by 90 degrees that bring the cells upright, 0 … 3 */
+  int32_t corrected;     /**< cells that were wrong */
+  int32_t erased;        /**< cells that were unknown */
+} lh_decoded_target;
+
+/** The names of all families, one a line. */
+LH_API lh_status lh_target_families(lh_context *ctx, char *buffer, size_t size, size_t *needed);
+/** LH_EINVAL: no such family; LH_EUNSUPPORTED: a family of AprilTag with cells outside of its border. */
+LH_API lh_status lh_target_family_info(lh_context *ctx, const char *family, lh_target_family *out);
+/** ids: room for id_count; ascending. */
+LH_API lh_status lh_target_family_ids(lh_context *ctx, const char *family, int32_t *ids, size_t n);
+/** cells: room for grid x grid, row-major from the top left: LH_CELL_DARK, LH_CELL_LIGHT. LH_EINVAL: no such id. */
+LH_API lh_status lh_target_family_cells(lh_context *ctx, const char *family, int32_t id, uint8_t *cells, size_t n);
+/** Circles only: the id that n = grid x grid cells (LH_CELL_…) show in some rotation. strength 0 … 1: how much of the
+ *  code's power corrects wrong cells; 0: none is accepted. LH_OK with id = -1 where there is no answer. */
+LH_API lh_status lh_target_family_decode(lh_context *ctx, const char *family, const uint8_t *cells, size_t n,
+                                         double strength, lh_decoded_target *out);
+
+/* ---- sets of targets --------------------------------------------------------------------------------------------- */
+
+/** What was printed and what is known of how it lies: designs, boards of targets at known places, fields of points. */
+typedef struct lh_target_set lh_target_set;
+
+/** One kind of target as printed. A target's frame: origin in the middle, x right, y down, z into the paper, metres. */
+typedef struct lh_target_design {
+  size_t struct_size;
+  double size_m;            /**< circles: from one centre to the next; squares: side of the black square. Where sheets
+                                 are written 0 is as large as fits */
+  double circle_diameter_m; /**< 0: half of size_m. Circles only */
+  double ring_diameter_m;   /**< of a ring's light centre; 0: 0.55 of the circle's. Circles only */
+  double scale_x, scale_y;  /**< true length / drawn length; 0: 1 */
+  int32_t solid_light;      /**< light cells are discs without a ring. Circles only */
+  int32_t has_colors;       /**< 0: circles dark green on light green, squares black on white */
+  uint32_t ink, paper;      /**< 0xRRGGBB, where has_colors */
+} lh_target_design;
+
+#define LH_GRID_CIRCLES 0
+#define LH_GRID_CHESSBOARD 1
+
+/** A field of points for lens calibration: circles, or the inner corners of a chessboard; row-major. */
+typedef struct lh_point_grid {
+  size_t struct_size;
+  int32_t kind;             /**< LH_GRID_… */
+  int32_t columns, rows;    /**< points along x and y, 2 … 100 */
+  double spacing_m;         /**< where a sheet is written 0 is as large as fits */
+  double circle_diameter_m; /**< 0: half of the spacing. Circles only */
+} lh_point_grid;
+
+/** Reads a "lumihull-targets" file. LH_EINPUT names the place of what is wrong or contradicts itself. */
+LH_API lh_status lh_target_set_load(lh_context *ctx, const char *file, lh_target_set **out);
+/** From FAMILY:SIZE, as "matrix5x5:18mm", "aruco:6x6_250:35mm", "chessboard:9x6:25mm"; several joined by commas. */
+LH_API lh_status lh_target_set_from_word(lh_context *ctx, const char *word, lh_target_set **out);
+/** A file where `text` names one (it ends with ".json" or exists), else a word. */
+LH_API lh_status lh_target_set_from_text(lh_context *ctx, const char *text, lh_target_set **out);
+LH_API lh_status lh_target_set_save(lh_context *ctx, const lh_target_set *set, const char *file);
+/** NULL is allowed. */
+LH_API void lh_target_set_destroy(lh_target_set *set);
+
+/** 0 for NULL. */
+LH_API size_t lh_target_set_design_count(const lh_target_set *set);
+LH_API size_t lh_target_set_board_count(const lh_target_set *set);
+LH_API size_t lh_target_set_grid_count(const lh_target_set *set);
+/** 0 for NULL and where there is no such board. */
+LH_API size_t lh_target_set_board_size(const lh_target_set *set, size_t board);
+
+LH_API lh_status lh_target_set_design(lh_context *ctx, const lh_target_set *set, size_t design, lh_target_design *out);
+/** The design's family. */
+LH_API lh_status lh_target_set_family(lh_context *ctx, const lh_target_set *set, size_t design, char *buffer, size_t size,
+                                      size_t *needed);
+/** xy: room for n x 2: where a design's features are in the target's frame, m: grid² circles, row-major from the top
+ *  left, or four corners: top left, top right, bottom right, bottom left. */
+LH_API lh_status lh_target_set_features(lh_context *ctx, const lh_target_set *set, size_t design, double *xy, size_t n);
+LH_API lh_status lh_target_set_board_name(lh_context *ctx, const lh_target_set *set, size_t board, char *buffer,
+                                          size_t size, size_t *needed);
+/** Target i of a board. design, id, board_from_target (3 x 4): each may be NULL. */
+LH_API lh_status lh_target_set_board_target(lh_context *ctx, const lh_target_set *set, size_t board, size_t i,
+                                            size_t *design, int32_t *id, double *board_from_target);
+LH_API lh_status lh_target_set_grid(lh_context *ctx, const lh_target_set *set, size_t grid, lh_point_grid *out);
+
+/* ---- sheets to print --------------------------------------------------------------------------------------------- */
+
+#define LH_PAPER_LETTER 0
+#define LH_PAPER_A4 1
+
+#define LH_SHEET_PDF 1
+#define LH_SHEET_SVG 2
+
+typedef struct lh_sheet_options {
+  size_t struct_size;
+  int32_t paper;       /**< LH_PAPER_… */
+  int32_t formats;     /**< LH_SHEET_… joined by |; 0: PDF */
+  int32_t per_sheet;   /**< targets on a sheet, 1 or 4; 0: 1 */
+  int32_t paint_paper; /**< fill the sheet with the paper's colour, for white paper */
+  int32_t no_text;     /**< no ids and no description in plain text */
+  int32_t no_bar;      /**< no bar of 150.0 mm */
+} lh_sheet_options;
+
+/**
+ * Draws sheets of targets: STEM.pdf with a page a sheet, or STEM-1.svg, STEM-2.svg, …; and STEM.json, which says where
+ * each target is: a board for each sheet, its origin the sheet's upper left corner.
+ *
+ * @param design  NULL: the defaults, as large as fits
+ * @param ids     n of the family's, each once
+ * @param out     NULL, or what was written into STEM.json
+ * @return LH_EINVAL: ids that the family does not have, a size that does not fit on the paper
+ */
+LH_API lh_status lh_target_sheets_write(lh_context *ctx, const char *stem, const char *family,
+                                        const lh_target_design *design, const int32_t *ids, size_t n,
+                                        const lh_sheet_options *options, lh_target_set **out);
+/** The same for one sheet with a field of points, black on white. */
+LH_API lh_status lh_grid_sheet_write(lh_context *ctx, const char *stem, const lh_point_grid *grid,
+                                     const lh_sheet_options *options, lh_target_set **out);
+
 /* ---- targets in photographs -------------------------------------------------------------------------------------- */
 
 /** Finds, reads and measures the targets of a set. Never changes: any number of threads may use one. */

@@ -6,6 +6,7 @@
 #include <lumihull/base/image.h>
 #include <lumihull/calib/color_key.h>
 #include <lumihull/calib/detect_targets.h>
+#include <lumihull/calib/target_set.h>
 #include <lumihull/hull/mesh.h>
 #include <lumihull/hull/ray_scene.h>
 
@@ -17,6 +18,10 @@ struct lh_image {
 
 struct lh_color_key {
   lumihull::calib::ColorKey value;
+};
+
+struct lh_target_set {
+  lumihull::calib::TargetSet value;
 };
 
 struct lh_mesh {

@@ -17,7 +17,7 @@ namespace {
 using namespace lumihull::calib;
 
 struct Arguments {
-  std::string output, family = "matrix5x5", ids, board, size, circle, ring, ink, paper_color;
+  std::string output, family = "matrix5x5", ids, board, size, circle, ring, bar, ink, paper_color;
   std::string paper = "letter", format = "pdf";
   int per_sheet = 1;
   bool solid_light = false, paint_paper = false, no_text = false, no_bar = false, overwrite = false, list = false;
@@ -92,7 +92,7 @@ Rgb parse_color(const std::string& text, const char* flag) {
   return color;
 }
 
-/// "18mm" in metres; a word's own rules hold.
+/// "18mm" in metres, by the rules for words.
 double parse_length(const std::string& text, const char* flag) {
   try {
     return TargetSet::from_word("matrix5x5:" + text).designs[0].size_m;
@@ -101,6 +101,9 @@ double parse_length(const std::string& text, const char* flag) {
   }
 }
 
+/// How many times too large the printer prints.
+double scale_of(const Arguments& a) { return a.bar.empty() ? 1 : parse_length(a.bar, "--bar") / 0.15; }
+
 TargetDesign design_of(const Arguments& a) {
   TargetDesign design;
   design.family = TargetFamily::by_name(a.family);
@@ -108,6 +111,7 @@ TargetDesign design_of(const Arguments& a) {
   if (!a.circle.empty()) design.circle_diameter_m = parse_length(a.circle, "--circle");
   if (!a.ring.empty()) design.ring_diameter_m = parse_length(a.ring, "--ring");
   design.solid_light = a.solid_light;
+  design.scale_x = design.scale_y = scale_of(a);
   if (design.family.kind() == TargetKind::square) {
     design.ink = {0, 0, 0};
     design.paper = {255, 255, 255};
@@ -120,9 +124,10 @@ TargetDesign design_of(const Arguments& a) {
 /// "chessboard:9x6:25mm", or without the size: as large as fits.
 PointGrid parse_board(const Arguments& a) {
   const bool sized = std::count(a.board.begin(), a.board.end(), ':') >= 2;
-  const TargetSet set = TargetSet::from_word(sized ? a.board : a.board + ":1mm");
-  if (set.grids.size() != 1 || !set.designs.empty())
+  if ((!a.board.starts_with("chessboard:") && !a.board.starts_with("circles:")) ||
+      a.board.find(',') != std::string::npos)
     throw Error(ErrorCode::invalid_argument, "expected chessboard:9x6:25mm or circles:11x8:15mm", "--board");
+  const TargetSet set = TargetSet::from_word(sized ? a.board : a.board + ":1mm");
   PointGrid grid = set.grids[0];
   if (!sized) grid.spacing_m = 0;
   if (!a.circle.empty()) grid.circle_diameter_m = parse_length(a.circle, "--circle");
@@ -168,71 +173,92 @@ void say_families(Program& program) {
   if (program.json) std::cout << "{\"families\": {" << json << "}}\n";
 }
 
+/// What came of a run.
+struct Written {
+  std::vector<std::string> files;  ///< the last one: what is on the sheets
+  std::size_t sheets = 0;
+  double size_m = 0;  ///< true length
+  std::string what;   ///< for people, but for the size
+  std::string word;   ///< for --targets, but for the size
+};
+
+void refuse_existing(const Arguments& a, const std::vector<std::string>& files) {
+  if (a.overwrite) return;
+  for (const std::string& file : files)
+    if (std::filesystem::exists(file))
+      throw Error(ErrorCode::invalid_argument, "the file exists; name another one, or --overwrite", file);
+}
+
+Written write_targets(Program& program, const Arguments& a, const std::string& stem, const SheetOptions& options) {
+  const std::vector<SheetFormat> formats = parse_formats(a.format);
+  const TargetDesign design = design_of(a);
+  const std::vector<int> ids = parse_ids(a.ids, design.family);
+  const std::size_t per_sheet = std::size_t(options.per_sheet);
+  Written written;
+  written.sheets = (ids.size() + per_sheet - 1) / per_sheet;
+  written.files = files_of(stem, formats, written.sheets);
+  refuse_existing(a, written.files);
+  const TargetSet set = write_target_sheets(stem, design, ids, formats, options, program.job());
+  written.size_m = set.designs[0].size_m * design.scale_x;
+  written.what = std::to_string(ids.size()) + " targets of " + a.family +
+                 (design.family.kind() == TargetKind::circles ? ", pitch " : ", black square ");
+  written.word = a.family;
+  return written;
+}
+
+Written write_board(const Arguments& a, const std::string& stem, const SheetOptions& options) {
+  const std::vector<SheetFormat> formats = parse_formats(a.format);
+  const Rgb ink = a.ink.empty() ? Rgb{0, 0, 0} : parse_color(a.ink, "--ink");
+  const Rgb paper = a.paper_color.empty() ? Rgb{255, 255, 255} : parse_color(a.paper_color, "--paper-color");
+  Written written;
+  written.sheets = 1;
+  written.files = files_of(stem, formats, 1);
+  refuse_existing(a, written.files);
+  TargetSet set = write_grid_sheet(stem, parse_board(a), formats, options, ink, paper);
+  PointGrid& grid = set.grids[0];
+  if (!a.bar.empty()) {
+    grid.spacing_m *= scale_of(a);
+    grid.circle_diameter_m *= scale_of(a);
+    set.save(written.files.back());
+  }
+  written.size_m = grid.spacing_m;
+  written.word = (grid.kind == PointGrid::Kind::circles ? "circles:" : "chessboard:") + std::to_string(grid.columns) +
+                 "x" + std::to_string(grid.rows);
+  written.what = written.word + ", spacing ";
+  return written;
+}
+
 void write_sheets(Program& program, const Arguments& a) {
-  if (a.output.empty())
-    throw Error(ErrorCode::invalid_argument, "expected a name for the files, as -o targets", "--output");
   std::string stem = a.output;
   for (const char* ending : {".pdf", ".svg", ".json"})
     if (stem.ends_with(ending)) stem.resize(stem.size() - std::string(ending).size());
+  if (stem.empty())
+    throw Error(ErrorCode::invalid_argument, "expected a name for the files, as -o targets", "--output");
   const SheetOptions options{.paper = a.paper == "a4" ? Paper::a4 : Paper::letter,
                              .per_sheet = a.per_sheet,
                              .paint_paper = a.paint_paper,
                              .ids = !a.no_text,
                              .scale_bar = !a.no_bar};
-  options.validate();
-  const std::vector<SheetFormat> formats = parse_formats(a.format);
-  std::vector<int> ids;
-  TargetDesign design;
-  if (a.board.empty()) {
-    design = design_of(a);
-    ids = parse_ids(a.ids, design.family);
-  }
-  const std::size_t per_sheet = std::size_t(options.per_sheet);
-  const std::size_t sheets = a.board.empty() ? (ids.size() + per_sheet - 1) / per_sheet : 1;
-  const std::vector<std::string> files = files_of(stem, formats, sheets);
-  if (!a.overwrite)
-    for (const std::string& file : files)
-      if (std::filesystem::exists(file))
-        throw Error(ErrorCode::invalid_argument, "the file exists; name another one, or --overwrite", file);
+  Written w = a.board.empty() ? write_targets(program, a, stem, options) : write_board(a, stem, options);
+  const std::string size = millimetres(w.size_m);
+  w.word += ":" + size.substr(0, size.find(' ')) + "mm";
 
-  std::string what, word;
-  double size_m = 0;
-  if (a.board.empty()) {
-    const TargetSet set = write_target_sheets(stem, design, ids, formats, options, program.job());
-    size_m = set.designs[0].size_m;
-    what = std::to_string(ids.size()) + " targets of " + a.family + ", " +
-           (design.family.kind() == TargetKind::circles ? "pitch " : "black square ") + millimetres(size_m);
-    word = a.family + ":" + millimetres(size_m);
-  } else {
-    const Rgb ink = a.ink.empty() ? Rgb{0, 0, 0} : parse_color(a.ink, "--ink");
-    const Rgb paper = a.paper_color.empty() ? Rgb{255, 255, 255} : parse_color(a.paper_color, "--paper-color");
-    const TargetSet set = write_grid_sheet(stem, parse_board(a), formats, options, ink, paper);
-    const PointGrid& grid = set.grids[0];
-    size_m = grid.spacing_m;
-    const std::string points = std::to_string(grid.columns) + "x" + std::to_string(grid.rows);
-    const char* kind = grid.kind == PointGrid::Kind::circles ? "circles" : "chessboard";
-    what = std::string(kind) + " " + points + ", spacing " + millimetres(size_m);
-    word = std::string(kind) + ":" + points + ":" + millimetres(size_m);
-  }
-  word.erase(std::remove(word.begin(), word.end(), ' '), word.end());
-
-  program.say(files.front() + (files.size() > 2 ? " and others" : "") + ": " + std::to_string(sheets) +
-              (sheets == 1 ? " sheet, " : " sheets, ") + what);
-  program.say(files.back() + ": what is on them, for --targets (or, where sheets are cut apart, the word " + word +
-              ")");
+  program.say(w.files.front() + (w.files.size() > 2 ? " and others" : "") + ": " + std::to_string(w.sheets) +
+              (w.sheets == 1 ? " sheet, " : " sheets, ") + w.what + size);
+  program.say(w.files.back() + ": what is on them" +
+              (a.per_sheet == 1 ? "" : "; once a sheet is cut apart, use the word " + w.word + " in its place"));
   program.say("Print at 100 % (\"actual size\", not \"fit to page\").");
-  if (options.scale_bar)
+  if (options.scale_bar && a.bar.empty())
     program.say(
-        "Then measure the bar. Where it is not 150.0 mm long, divide its length by 150 and write that as scale_x and "
-        "scale_y of the design into " +
-        files.back() + ".");
+        "Then measure the bar. Where it is not 150.0 mm long, say so: the same command with --overwrite --bar 149.2mm");
   if (!program.json) return;
   std::string list;
-  for (const std::string& file : files) list += (list.empty() ? "" : ", ") + json_text(file);
-  char size[40];
-  std::snprintf(size, sizeof size, "%.9g", size_m);
-  std::cout << "{\"files\": [" << list << "], \"targets\": " << json_text(files.back())
-            << ", \"word\": " << json_text(word) << ", \"sheets\": " << sheets << ", \"size_m\": " << size << "}\n";
+  for (const std::string& file : w.files) list += (list.empty() ? "" : ", ") + json_text(file);
+  char number[40];
+  std::snprintf(number, sizeof number, "%.9g", w.size_m);
+  std::cout << "{\"files\": [" << list << "], \"targets\": " << json_text(w.files.back())
+            << ", \"word\": " << json_text(w.word) << ", \"sheets\": " << w.sheets << ", \"size_m\": " << number
+            << "}\n";
 }
 
 }  // namespace
@@ -267,6 +293,8 @@ void add_targets(Program& program) {
   verb->add_option("--format", a->format, "pdf, svg or pdf,svg [pdf]");
   verb->add_flag("--no-text", a->no_text, "no ids and no description in plain text");
   verb->add_flag("--no-bar", a->no_bar, "no bar of 150.0 mm");
+  verb->add_option("--bar", a->bar,
+                   "how long the bar is on paper, where it is not 150.0mm: the file then says the true lengths");
   verb->add_flag("--overwrite", a->overwrite, "replace files that exist");
   verb->add_flag("--list", a->list, "the families and how many ids each has; writes nothing");
   verb->footer(

@@ -11,15 +11,19 @@ calls release the GIL, take `progress=` (called with a Progress) and stop at Ctr
 """
 
 from ._lumihull import NO_HIT as NO_HIT
+from ._lumihull import Board as Board
+from ._lumihull import BoardTarget as BoardTarget
 from ._lumihull import Camera as Camera
 from ._lumihull import Capture as Capture
 from ._lumihull import ColorKey as ColorKey
+from ._lumihull import DecodedTarget as DecodedTarget
 from ._lumihull import Detection as Detection
 from ._lumihull import Detections as Detections
 from ._lumihull import Error as Error
 from ._lumihull import Image as Image
 from ._lumihull import Mesh as Mesh
 from ._lumihull import MeshCheck as MeshCheck
+from ._lumihull import PointGrid as PointGrid
 from ._lumihull import Pose as Pose
 from ._lumihull import Progress as Progress
 from ._lumihull import RayScene as RayScene
@@ -27,7 +31,10 @@ from ._lumihull import RefusedTarget as RefusedTarget
 from ._lumihull import Renderer as Renderer
 from ._lumihull import Rendering as Rendering
 from ._lumihull import StageResult as StageResult
+from ._lumihull import TargetDesign as TargetDesign
 from ._lumihull import TargetDetector as TargetDetector
+from ._lumihull import TargetFamily as TargetFamily
+from ._lumihull import TargetSet as TargetSet
 from ._lumihull import View as View
 from ._lumihull import __version__ as __version__
 from ._lumihull import carve as carve
@@ -47,6 +54,8 @@ from ._lumihull import silhouette_iou as silhouette_iou
 from ._lumihull import ssim as ssim
 from ._lumihull import stage_names as stage_names
 from ._lumihull import stage_options as stage_options
+from ._lumihull import write_grid_sheet as write_grid_sheet
 from ._lumihull import write_jpeg as write_jpeg
 from ._lumihull import write_mesh as write_mesh
 from ._lumihull import write_png as write_png
+from ._lumihull import write_target_sheets as write_target_sheets

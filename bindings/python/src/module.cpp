@@ -169,5 +169,6 @@ PYBIND11_MODULE(_lumihull, module) {
   python::bind_model(module);
   python::bind_capture(module);
   python::bind_views(module);
+  python::bind_targets(module);
   python::bind_detections(module);
 }
