@@ -23,6 +23,7 @@ from ._lumihull import Progress as Progress
 from ._lumihull import RayScene as RayScene
 from ._lumihull import Renderer as Renderer
 from ._lumihull import Rendering as Rendering
+from ._lumihull import Resection as Resection
 from ._lumihull import StageResult as StageResult
 from ._lumihull import View as View
 from ._lumihull import __version__ as __version__
@@ -39,6 +40,7 @@ from ._lumihull import import_projections as import_projections
 from ._lumihull import psnr as psnr
 from ._lumihull import read_image as read_image
 from ._lumihull import read_mesh as read_mesh
+from ._lumihull import resect as resect
 from ._lumihull import silhouette_iou as silhouette_iou
 from ._lumihull import ssim as ssim
 from ._lumihull import stage_names as stage_names
