@@ -30,6 +30,7 @@ from ._lumihull import RayScene as RayScene
 from ._lumihull import RefusedTarget as RefusedTarget
 from ._lumihull import Renderer as Renderer
 from ._lumihull import Rendering as Rendering
+from ._lumihull import Resection as Resection
 from ._lumihull import StageResult as StageResult
 from ._lumihull import TargetDesign as TargetDesign
 from ._lumihull import TargetDetector as TargetDetector
@@ -50,6 +51,7 @@ from ._lumihull import import_projections as import_projections
 from ._lumihull import psnr as psnr
 from ._lumihull import read_image as read_image
 from ._lumihull import read_mesh as read_mesh
+from ._lumihull import resect as resect
 from ._lumihull import silhouette_iou as silhouette_iou
 from ._lumihull import ssim as ssim
 from ._lumihull import stage_names as stage_names

@@ -528,3 +528,34 @@ def write_grid_sheet(
     ink: _Rgb = ...,
     paper_color: _Rgb = ...,
 ) -> TargetSet: ...
+class Resection:
+    @property
+    def pose(self) -> Pose: ...
+    @property
+    def covariance(self) -> NDArray[np.float64]: ...
+    @property
+    def outliers(self) -> NDArray[np.int64]: ...
+    @property
+    def rms_px(self) -> float: ...
+    @property
+    def sigma0(self) -> float: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def alternative(self) -> Optional[Pose]: ...
+    @property
+    def alternative_chi2_ratio(self) -> float: ...
+
+def resect(
+    camera: Camera,
+    pixels: ArrayLike,
+    world: ArrayLike,
+    covariances: Optional[ArrayLike] = None,
+    *,
+    radii: Optional[ArrayLike] = None,
+    normals: Optional[ArrayLike] = None,
+    robust: bool = True,
+    outlier_sigma: float = 4.0,
+    max_iterations: int = 20,
+    seed: int = 1,
+) -> Resection: ...

@@ -157,7 +157,9 @@ class Resecting {
       if (s.weights == before) break;
       minimise(points_, s.weights, 0, options_.max_iterations, true, s.fit);
       squared_distances(points_, s.fit.pose, d2_);
-      s.scale = scale_of(s.weights);
+      // From all their residuals: less uncertain than a median, which has done its work.
+      const double freedom = 2.0 * s.count - 6;
+      s.scale = std::max(std::sqrt(s.fit.at.cost / freedom) * (1 + 5 / freedom), 1e-6 / sigma_px_);
       before = s.weights;
     }
     return std::isfinite(s.fit.at.cost);

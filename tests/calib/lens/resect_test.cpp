@@ -61,7 +61,7 @@ TEST(Resect, ReachesTheBoundAndKnowsItsCovariance) {
   for (const bool planar : {false, true})
     for (const int points : {8, 40, 200}) {
       double sum = 0, sigma = 0;
-      constexpr int kDraws = 1500;
+      constexpr int kDraws = 1000;
       for (std::uint64_t seed = 0; seed < kDraws; ++seed) {
         const auto scene =
             resect_scene(seed, {.points = points, .planar = planar, .circles = points == 40, .noise_px = 0.1});
