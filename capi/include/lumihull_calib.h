@@ -227,6 +227,52 @@ LH_API lh_status lh_detections_draw(lh_context *ctx, const lh_detections *detect
                                     const lh_target_detector *detector, const lh_image *photo, double magnify,
                                     lh_image **out);
 
+/* ---- resection --------------------------------------------------------------------------------------------------- */
+
+/** Arrays are borrowed for the call; NULL: the default for all matches. */
+typedef struct lh_resect_options {
+  size_t struct_size;
+  const double *covariances; /**< n x 2 x 2, px², of the pixels; NULL: 1 px² each */
+  const double *radii;       /**< n, in the world's unit: > 0 a circle, whose pixel is its ellipse's centre; NULL: points */
+  const double *normals;     /**< n x 3, of the circles' planes; not NULL where radii is not */
+  double outlier_sigma;      /**< beyond so many standard deviations (2-D) a match is an outlier, 2 … 100; 0: 4 */
+  int32_t not_robust;        /**< yes: every match counts */
+  int32_t max_iterations;    /**< 1 … 1000; 0: 20 */
+  uint64_t seed;             /**< of the minimal samples; 0: 1 */
+} lh_resect_options;
+
+typedef struct lh_resection {
+  size_t struct_size;
+  /** 6 x 6, of (rotation vector, translation) of a small motion applied after cam_from_world, in the camera's frame:
+   *  rad, world's unit. Times sigma0² where that is above 1 by more than chance. */
+  double covariance[36];
+  double rms_px;       /**< sqrt(sum of dx² + dy² over the matches that count / their number) */
+  double sigma0;       /**< about 1 where the covariances are right */
+  uint64_t outliers;   /**< how many matches don't count */
+  int32_t iterations;
+  /** Yes: a plane seen almost without perspective; another tilt fits nearly as well. */
+  int32_t has_alternative;
+  double alternative[12];        /**< cam_from_world, too */
+  double alternative_chi2_ratio; /**< its weighted squared residuals over those of the first, >= 1 */
+} lh_resection;
+
+/**
+ * Finds the pose of one photograph from points of known position.
+ *
+ * @param pixels         n x 2, px
+ * @param world          n x 3, any unit
+ * @param n              >= 4, at different places, not all on a line
+ * @param cam_from_world 3 x 4
+ * @param result         NULL, or what is known about it
+ * @param outlier        NULL, or n: 1 for a match that does not count, else 0
+ * @return LH_EINVAL: n too small or a value not finite; LH_EDEGENERATE: collinear or repeated points, points behind the
+ *         camera, a mirrored world, no pose that the matches agree on
+ * Source: Hartley & Zisserman 2000, ch. 7 (DLT), refined by reprojection error through the lens.
+ */
+LH_API lh_status lh_resect(lh_context *ctx, const lh_camera *camera, const double *pixels, const double *world, size_t n,
+                           const lh_resect_options *options, double cam_from_world[12], lh_resection *result,
+                           uint8_t *outlier);
+
 #ifdef __cplusplus
 }
 #endif

@@ -131,6 +131,7 @@ int Program::run(int argc, char** argv) {
   add_info(*this);
   add_intrinsics(*this);
   add_targets(*this);
+  add_detect(*this);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

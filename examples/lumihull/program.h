@@ -88,5 +88,6 @@ void add_run(Program& program);
 void add_info(Program& program);
 void add_intrinsics(Program& program);
 void add_targets(Program& program);
+void add_detect(Program& program);
 
 }  // namespace lumihull::program
