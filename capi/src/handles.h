@@ -5,10 +5,12 @@
 #include <lumihull/base/capture.h>
 #include <lumihull/base/image.h>
 #include <lumihull/calib/color_key.h>
+#include <lumihull/calib/lens_calibration.h>
 #include <lumihull/hull/mesh.h>
 #include <lumihull/hull/ray_scene.h>
 
 #include <cstddef>
+#include <vector>
 
 struct lh_image {
   lumihull::Image value;
@@ -28,4 +30,9 @@ struct lh_ray_scene {
 
 struct lh_capture {
   lumihull::Capture value;
+};
+
+struct lh_lens {
+  lumihull::calib::LensCalibration value;
+  std::vector<std::size_t> first;  ///< of each view's points, and their number at the end
 };

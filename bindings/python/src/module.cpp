@@ -169,4 +169,5 @@ PYBIND11_MODULE(_lumihull, module) {
   python::bind_model(module);
   python::bind_capture(module);
   python::bind_views(module);
+  python::bind_lens(module);
 }
