@@ -7,10 +7,12 @@
 #include <lumihull/calib/color_key.h>
 #include <lumihull/calib/detect_targets.h>
 #include <lumihull/calib/target_set.h>
+#include <lumihull/calib/lens_calibration.h>
 #include <lumihull/hull/mesh.h>
 #include <lumihull/hull/ray_scene.h>
 
 #include <cstddef>
+#include <vector>
 
 struct lh_image {
   lumihull::Image value;
@@ -42,4 +44,9 @@ struct lh_target_detector {
 
 struct lh_detections {
   lumihull::calib::Detections value;
+};
+
+struct lh_lens {
+  lumihull::calib::LensCalibration value;
+  std::vector<std::size_t> first;  ///< of each view's points, and their number at the end
 };

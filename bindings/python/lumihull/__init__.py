@@ -21,6 +21,7 @@ from ._lumihull import Detection as Detection
 from ._lumihull import Detections as Detections
 from ._lumihull import Error as Error
 from ._lumihull import Image as Image
+from ._lumihull import LensCalibration as LensCalibration
 from ._lumihull import Mesh as Mesh
 from ._lumihull import MeshCheck as MeshCheck
 from ._lumihull import PointGrid as PointGrid
@@ -38,9 +39,11 @@ from ._lumihull import TargetFamily as TargetFamily
 from ._lumihull import TargetSet as TargetSet
 from ._lumihull import View as View
 from ._lumihull import __version__ as __version__
+from ._lumihull import calibrate_lens as calibrate_lens
 from ._lumihull import carve as carve
 from ._lumihull import export_colmap as export_colmap
 from ._lumihull import export_nerf as export_nerf
+from ._lumihull import find_point_grid as find_point_grid
 from ._lumihull import import_colmap as import_colmap
 from ._lumihull import import_enclosure as import_enclosure
 from ._lumihull import import_masks as import_masks

@@ -172,4 +172,5 @@ PYBIND11_MODULE(_lumihull, module) {
   python::bind_targets(module);
   python::bind_detections(module);
   python::bind_resect(module);
+  python::bind_lens(module);
 }

@@ -74,7 +74,7 @@ std::string by_radius(const LensCalibration& c, const std::vector<Seen>& seen) {
     farthest = std::max(farthest, (s.pixel - center).norm());
     limit = std::max(limit, s.error.cwiseAbs().maxCoeff());
   }
-  figure.note("the part along the radius; blue line: mean of a twelfth, dashed: plus and minus its standard deviation");
+  figure.note("the part along the radius; green: mean of a twelfth, dashed: plus and minus its standard deviation");
   figure.axes(0, farthest, -limit, limit, "distance, px", "residual outwards, px");
   constexpr int kBins = 12;
   std::array<double, kBins> n{}, sum{}, squares{};

@@ -65,12 +65,12 @@ void SvgFigure::axes(double x0, double x1, double y0, double y1, const std::stri
   for (double i = std::ceil(left / dx - 1e-9); i * dx <= right + 1e-9 * dx; ++i) {
     line(i * dx, y0_, i * dx, y1_, "grid");
     body_ += "<text class=\"small\" x=\"" + px(x_of(i * dx)) + "\" y=\"" + px(height_ - kBottom + 15) +
-             "\" text-anchor=\"middle\">" + number("%.6g", i * dx) + "</text>\n";
+             "\" text-anchor=\"middle\">" + number("%.6g", i * dx + 0.0) + "</text>\n";
   }
   for (double i = std::ceil(low / dy - 1e-9); i * dy <= high + 1e-9 * dy; ++i) {
     line(x0_, i * dy, x1_, i * dy, "grid");
     body_ += "<text class=\"small\" x=\"" + px(kLeft - 6) + "\" y=\"" + px(y_of(i * dy) + 4) +
-             "\" text-anchor=\"end\">" + number("%.6g", i * dy) + "</text>\n";
+             "\" text-anchor=\"end\">" + number("%.6g", i * dy + 0.0) + "</text>\n";
   }
   body_ += "<text class=\"small\" x=\"" + px(0.5 * (kLeft + width_ - kRight)) + "\" y=\"" + px(height_ - 10) +
            "\" text-anchor=\"middle\">" + html_text(x_label) + "</text>\n<text class=\"small\" transform=\"translate(14 " +
@@ -89,7 +89,7 @@ void SvgFigure::dot(double x, double y, double radius_px, std::string_view style
 
 void SvgFigure::box(double x0, double y0, double x1, double y1, std::string_view style) {
   const double a = x_of(x0), b = x_of(x1), c = y_of(y0), d = y_of(y1);
-  body_ += "<rect" + painted(style) + " x=\"" + px(std::min(a, b)) + "\" y=\"" + px(std::min(c, d)) + "\" width=\"" +
+  body_ += "<rect shape-rendering=\"crispEdges\"" + painted(style) + " x=\"" + px(std::min(a, b)) + "\" y=\"" + px(std::min(c, d)) + "\" width=\"" +
            px(std::abs(b - a)) + "\" height=\"" + px(std::abs(d - c)) + "\"/>\n";
 }
 

@@ -1,6 +1,7 @@
 #include "real_boards.h"
 
 #include <cstdio>
+#include <cstdlib>
 
 #include "support.h"
 #include "zhang_model.h"
@@ -60,7 +61,7 @@ TEST(RealBoards, ChessboardsAgreeWithOpenCv) {
       const LensCalibration ours = calibrate(same, views.width, views.height, {f, s, u0, v0, k1, k2, k3, p1, p2});
       const LensCalibration weighted = calibrate(*corners, views.width, views.height, {f, s, u0, v0, k1, k2, k3, p1, p2});
       const double fx = ours.camera.s * ours.camera.f;
-      std::printf("%s %s corners: %zu views; OpenCV rms %.4f fx %.3f +- %.3f fy %.3f c %.2f %.2f; ours rms %.4f fx %.3f fy %.3f +- %.3f c %.2f %.2f; weighted rms %.4f f %.3f sigma0 %.2f cv %.3f %.2f\n",
+      if (std::getenv("LUMIHULL_VERBOSE")) std::printf("%s %s corners: %zu views; OpenCV rms %.4f fx %.3f +- %.3f fy %.3f c %.2f %.2f; ours rms %.4f fx %.3f fy %.3f +- %.3f c %.2f %.2f; weighted rms %.4f f %.3f sigma0 %.2f cv %.3f %.2f\n",
                   side.c_str(), corners == &views.ours ? "our" : "OpenCV's", corners->size(), theirs.rms_px, theirs.fx, theirs.fx_sigma, theirs.fy, theirs.cx, theirs.cy,
                   ours.rms_px, fx, ours.camera.f, std::sqrt(ours.covariance(0, 0)) * ours.sigma0, ours.camera.u0, ours.camera.v0, weighted.rms_px, weighted.camera.f, weighted.sigma0, weighted.cross_validation_px, weighted.cross_validation_sigma);
       EXPECT_LT(ours.rms_px, 1.005 * theirs.rms_px);
