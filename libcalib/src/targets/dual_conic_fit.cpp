@@ -160,7 +160,7 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
   const UnitFrame frame(guess);
   const double reach = 2 * options.gradient_sigma_px + 1, scale = std::sqrt(guess.a * guess.b);
   const double wall = options.inner_ratio > 0 ? (1 - options.inner_ratio) * guess.b : guess.b;  // to the next contour
-  const BandWidth band{std::min(reach, 0.6 * wall), reach, kHighestRatio};
+  const BandWidth band{std::min(reach, options.inner_ratio > 0 ? 0.4 * wall : wall), reach, kHighestRatio};
 
   std::vector<BandPixel> pixels;
   pixels.reserve(std::size_t(8 * guess.a * (band.inward + band.outward)) + 64);
@@ -250,7 +250,10 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
 
 EllipseFit dual_conic_fit(const LightPlane& plane, const Ellipse& guess, const EllipseOptions& options) {
   options.validate();
-  return dual_conic_start(plane, guess, options, true);
+  // A band that lies to one side of the contour draws the answer to that side: once more, about the answer.
+  const EllipseFit first = dual_conic_start(plane, guess, options, false);
+  if (first.state != EllipseState::good) return first;
+  return dual_conic_start(plane, first.ellipse, options, true);
 }
 
 }  // namespace lumihull::calib

@@ -206,6 +206,38 @@ TEST(FitEllipse, HiddenPartsAreLeftOutOrRefused) {
     }
 }
 
+TEST(FitEllipse, NeighboursOfALattice) {
+  // Gaps are as wide as the circles. Half of the neighbours are missing, so that nothing cancels.
+  for (const double minor : {5.0, 8.0, 20.0}) {
+    std::mt19937_64 random(12);
+    double sum = 0;
+    int count = 0, good = 0;
+    for (int phase = 0; phase < 3; ++phase) {
+      EllipseScene scene = test::scene_of(minor, 0.7, 0.7 * phase, minor < 6 ? 0.7 : 1, random);
+      const Ellipse truth = scene.ellipses[0].ellipse;
+      const Eigen::Vector2d right = 4 * (truth.point(0) - truth.center), down = 4 * (truth.point(1.5707963) - truth.center);
+      for (const Eigen::Vector2d& offset : {right, down, Eigen::Vector2d(right + down)}) {
+        Ellipse other = truth;
+        other.center += offset;
+        scene.ellipses.push_back({other, 0.1});
+      }
+      const std::vector<double> values = render(scene);
+      for (int i = 0; i < 60; ++i) {
+        const EllipseFit fit =
+            fit_ellipse(noisy_plane(scene, values, {64e-6, 0}, random), test::rough_guess(truth, random));
+        ++count;
+        if (fit.state != EllipseState::good) continue;
+        const Eigen::Vector2d error = fit.ellipse.center - truth.center;
+        ++good;
+        sum += error.dot(fit.center_covariance().inverse() * error);
+      }
+    }
+    std::printf("%2.0f px beside others: %d of %d, mahalanobis² %.2f\n", minor, good, count, sum / good);
+    EXPECT_GE(good, 0.98 * count) << minor;
+    EXPECT_LT(sum / good, 2.6) << minor;
+  }
+}
+
 TEST(FitEllipse, ClippedLight) {
   std::mt19937_64 random(7);
   EllipseScene scene = test::scene_of(16, 0.8, 0.3, 0.8, random);
