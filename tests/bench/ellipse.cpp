@@ -1,6 +1,6 @@
 // Centres of ellipses: the maximum-likelihood fit and the dual-conic operator beside what OpenCV offers, on the same
-// pictures of known truth, against the Cramér-Rao bound of the renderer. Peers get linear light, the surroundings of the
-// truth, and of each setting the one that does best on these very pictures.
+// pictures of known truth, against the Cramér-Rao bound of the renderer. Peers get linear light, the surroundings of
+// the truth, and of each setting the one that does best on these very pictures.
 //
 //     bench_ellipse [samples a case = 120]
 
@@ -72,7 +72,8 @@ std::optional<Vector2d> canny(const Picture& picture, double sigma, bool sub_pix
     if (ix < 0 || iy < 0 || ix + 1 >= dx.cols || iy + 1 >= dx.rows) return 0.0;
     const double u = x - ix, v = y - iy;
     const auto at = [&](int a, int b) { return std::hypot(double(dx.at<short>(b, a)), double(dy.at<short>(b, a))); };
-    return (1 - v) * ((1 - u) * at(ix, iy) + u * at(ix + 1, iy)) + v * ((1 - u) * at(ix, iy + 1) + u * at(ix + 1, iy + 1));
+    return (1 - v) * ((1 - u) * at(ix, iy) + u * at(ix + 1, iy)) +
+           v * ((1 - u) * at(ix, iy + 1) + u * at(ix + 1, iy + 1));
   };
   std::vector<cv::Point2f> points;
   for (int y = 0; y < edges.rows; ++y)
@@ -83,7 +84,8 @@ std::optional<Vector2d> canny(const Picture& picture, double sigma, bool sub_pix
       if (r < 0.5 || r > 1.5) continue;
       if (sub_pixel) {
         const Vector2d g = Vector2d(dx.at<short>(y, x), dy.at<short>(y, x)).normalized();
-        const double before = magnitude(x - g.x(), y - g.y()), here = magnitude(x, y), after = magnitude(x + g.x(), y + g.y());
+        const double before = magnitude(x - g.x(), y - g.y()), here = magnitude(x, y),
+                     after = magnitude(x + g.x(), y + g.y());
         const double bend = before - 2 * here + after;
         if (bend < 0) p += g * std::clamp(0.5 * (before - after) / bend, -1.0, 1.0);
       }
@@ -156,7 +158,8 @@ struct Result {
   int good = 0;
 };
 
-Result judge(const std::vector<Picture>& pictures, const std::function<std::optional<Vector2d>(const Picture&)>& method) {
+Result judge(const std::vector<Picture>& pictures,
+             const std::function<std::optional<Vector2d>(const Picture&)>& method) {
   Result result;
   for (const Picture& p : pictures) {
     const double start = cpu_us();
@@ -178,8 +181,8 @@ void print(const char* name, const Result& r, double bound, std::size_t count, c
 }
 
 /// The setting that does best.
-void print_best(const char* name, const std::vector<Picture>& pictures, const std::vector<double>& settings, double bound,
-                const std::function<std::optional<Vector2d>(const Picture&, double)>& method) {
+void print_best(const char* name, const std::vector<Picture>& pictures, const std::vector<double>& settings,
+                double bound, const std::function<std::optional<Vector2d>(const Picture&, double)>& method) {
   Result best;
   double chosen = 0;
   for (const double setting : settings) {
@@ -248,11 +251,13 @@ void run(const Case& c, int samples) {
              [](const Picture& p, double s) { return half_level(p, s, true); });
   print_best("Canny + parabola, fitEllipse", pictures, sigmas, bound,
              [](const Picture& p, double s) { return canny(p, s, true); });
-  print_best("Canny, fitEllipse", pictures, sigmas, bound, [](const Picture& p, double s) { return canny(p, s, false); });
+  print_best("Canny, fitEllipse", pictures, sigmas, bound,
+             [](const Picture& p, double s) { return canny(p, s, false); });
   if (c.inner_ratio == 0) {
     print_best("centroid of darkness", pictures, {0.5, 1, 1.5, 2, 3, 4}, bound,
                [](const Picture& p, double s) { return moments(p, s); });
-    print_best("SimpleBlobDetector", pictures, {2, 5, 10}, bound, [](const Picture& p, double s) { return blob(p, s); });
+    print_best("SimpleBlobDetector", pictures, {2, 5, 10}, bound,
+               [](const Picture& p, double s) { return blob(p, s); });
   }
   std::fflush(stdout);
 }

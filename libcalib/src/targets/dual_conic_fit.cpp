@@ -18,7 +18,7 @@ using Vector5 = Eigen::Matrix<double, 5, 1>;
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
 using Matrix52 = Eigen::Matrix<double, 5, 2>;
 
-constexpr int kMaxRadius = 15;  // of filters, px: 3 sigma
+constexpr int kMaxRadius = 15;         // of filters, px: 3 sigma
 constexpr double kHighestRatio = 1.8;  // of the band: circles' gaps are as wide as they are, and 0.4 of one is ours
 
 /// A Gaussian and its derivative, as taps -radius … radius for a correlation: a ramp of slope 1 has the derivative 1.
@@ -77,12 +77,15 @@ struct BandPixel {
   }
 };
 
-/// Σ over pixels j of var_j (dΘ/dI_j)(dΘ/dI_j)ᵀ, where dΘ/dI_j = Σ_i by_gradient_i · D_ij over the band's pixels i and D the
-/// filters' taps. Band pixels come row by row, so that 2 radius + 1 rows of sums are enough.
+/// Σ over pixels j of var_j (dΘ/dI_j)(dΘ/dI_j)ᵀ, where dΘ/dI_j = Σ_i by_gradient_i · D_ij over the band's pixels i and
+/// D the filters' taps. Band pixels come row by row, so that 2 radius + 1 rows of sums are enough.
 class NoisePropagation {
  public:
   NoisePropagation(const LightPlane& plane, const Filters& filters, int x0, int x1)
-      : plane_(plane), f_(filters), x0_(x0 - filters.radius), width_(std::size_t(x1 - x0 + 2 * filters.radius)),
+      : plane_(plane),
+        f_(filters),
+        x0_(x0 - filters.radius),
+        width_(std::size_t(x1 - x0 + 2 * filters.radius)),
         rows_(std::size_t(2 * filters.radius + 1), std::vector<Vector5>(width_, Vector5::Zero())) {}
 
   void add(const BandPixel& p, const Matrix52& by_gradient) {
@@ -173,7 +176,8 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
     if (value >= double(plane.saturation)) ++clipped;
     if (distance < -0.5 * band.inward) inside += value, ++n_inside;
     if (distance > 0.5 * band.outward) outside += value, ++n_outside;
-    BandPixel p{x, y, (Eigen::Vector2d(x + 0.5, y + 0.5) - guess.center) / scale, gradient(plane.values, filters, x, y)};
+    BandPixel p{x, y, (Eigen::Vector2d(x + 0.5, y + 0.5) - guess.center) / scale,
+                gradient(plane.values, filters, x, y)};
     if (!p.gradient.allFinite()) return;
     double c = 0;
     const Vector5 k = p.monomials(c);
