@@ -163,18 +163,20 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
   const UnitFrame frame(guess);
   const double reach = 2 * options.gradient_sigma_px + 1, scale = std::sqrt(guess.a * guess.b);
   const double wall = options.inner_ratio > 0 ? (1 - options.inner_ratio) * guess.b : guess.b;  // to the next contour
-  const BandWidth band{std::min(reach, options.inner_ratio > 0 ? 0.4 * wall : wall), reach, kHighestRatio};
+  const BandWidth band{std::min(reach, options.inner_ratio > 0 ? 0.6 * wall : wall), reach, kHighestRatio};
 
   std::vector<BandPixel> pixels;
   pixels.reserve(std::size_t(8 * guess.a * (band.inward + band.outward)) + 64);
-  double inside = 0, outside = 0, energy = 0;
-  int n_inside = 0, n_outside = 0, clipped = 0;
+  // Levels are those of the band's outer parts; of a thin ring these may hold no pixel's centre, then all of a side.
+  double inside = 0, outside = 0, any_inside = 0, energy = 0;
+  int n_inside = 0, n_outside = 0, n_any_inside = 0, clipped = 0;
   Matrix5 normal = Matrix5::Zero();
   Vector5 right = Vector5::Zero();
   for_each_in_band(guess, frame, band, box, [&](int x, int y, const Eigen::Vector2d&, double distance) {
     const double value = plane.values.row<float>(y)[x];
     if (value >= double(plane.saturation)) ++clipped;
     if (distance < -0.5 * band.inward) inside += value, ++n_inside;
+    if (distance < 0) any_inside += value, ++n_any_inside;
     if (distance > 0.5 * band.outward) outside += value, ++n_outside;
     BandPixel p{x, y, (Eigen::Vector2d(x + 0.5, y + 0.5) - guess.center) / scale,
                 gradient(plane.values, filters, x, y)};
@@ -186,6 +188,7 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
     energy += p.gradient.squaredNorm();
     pixels.push_back(p);
   });
+  if (n_inside == 0) inside = any_inside, n_inside = n_any_inside;
   if (pixels.size() < 12 || n_inside == 0 || n_outside == 0) return fit;
   fit.inside = inside / n_inside;
   fit.outside = outside / n_outside;
