@@ -1,13 +1,14 @@
 // How surely targets are found and read: rates by size, tilt and blur for each family, and wrong ids among all renders.
 // libapriltag and OpenCV's ArUco look at tags of the same outer size in the same poses.
 //
-//     bench_detection [OUT_FOLDER] [--renders 2000] [--families matrix5x5,…] [--seed 1] [--threads 0]
+//     bench_detection [OUT_FOLDER] [--renders 2000] [--families matrix5x5,…] [--seed 1] [--threads 0] [--only INDEX]
 //
 // Each family gets its share of the renders. A render: one target on its sheet under random turn, tilt (0 … 75°), circles'
 // minor axis (3.5 … 40 px, mostly small; a tag's as if it were a 5 x 5 target of its outer size), blur (half of them .3 …
 // 1, half 0 … 3 px), exposure, shading, noise of .3 … 2 % of white, background; a quarter each in the corner of a 10 mm
 // lens's picture, through a Bayer mosaic, through a JPEG, one in twenty partly hidden. `found`: the id was read and each
-// feature is where it belongs; a detection that is not is wrong.
+// feature is where it belongs; a detection that is not is wrong. --only writes that render of each family as a picture and
+// says what was refused, and why.
 
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
@@ -27,6 +28,7 @@
 #include <functional>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <opencv2/aruco.hpp>
 #include <opencv2/core.hpp>
 #include <string>
@@ -49,6 +51,7 @@ struct Settings {
   std::vector<std::string> families{"matrix5x5", "matrix6x6", "paper4x4", "apriltag:36h11", "aruco:6x6_250"};
   std::uint64_t seed = 1;
   unsigned threads = 0;
+  std::optional<std::size_t> only;
 };
 
 /// What became of one render, by one detector.
@@ -164,44 +167,88 @@ struct Row {
   const std::vector<Render>* renders;
 };
 
-std::vector<Render> study(const std::string& name, const Settings& s, std::size_t count, Job& job) {
-  calib::TargetSet set;
+/// One family's renders: all that follows from their numbers.
+struct Family {
+  std::string name;
   calib::TargetDesign design;
-  design.family = calib::TargetFamily::by_name(name);
-  design = test::sized(design, .09);
-  if (design.family.kind() == calib::TargetKind::square) design.ink = {25, 25, 25}, design.paper = {215, 215, 215};
-  set.designs = {design};
-  calib::DetectOptions options;
-  options.min_circle_px = 3;
-  const calib::TargetDetector detector(set, options);
-  const auto ids = design.family.ids();
+  calib::TargetDetector detector;
+  std::uint64_t seed;
 
+  Family(const std::string& family, std::uint64_t of_renders)
+      : name(family), design(make_design(family)), detector(set_of(design), smallest()), seed(of_renders) {}
+
+  static calib::TargetDesign make_design(const std::string& family) {
+    calib::TargetDesign d;
+    d.family = calib::TargetFamily::by_name(family);
+    if (d.family.kind() == calib::TargetKind::square) d.ink = {25, 25, 25}, d.paper = {215, 215, 215};
+    return test::sized(d, .09);
+  }
+  static calib::TargetSet set_of(const calib::TargetDesign& d) {
+    calib::TargetSet set;
+    set.designs = {d};
+    return set;
+  }
+  static calib::DetectOptions smallest() {
+    calib::DetectOptions options;
+    options.min_circle_px = 3;
+    return options;
+  }
+
+  test::TargetShot shot(std::size_t i, test::Seen& seen) const {
+    const std::uint64_t own = test::Dice(seed * 0x100000001ull + i).next();
+    seen = draw(own);
+    const auto ids = design.family.ids();
+    return test::photograph_target(design, ids[std::size_t(own >> 7) % ids.size()], seen, own);
+  }
+};
+
+/// Writes a render and says what was made of it.
+void show(const Family& family, std::size_t i, const fs::path& out) {
+  test::Seen seen;
+  const test::TargetShot shot = family.shot(i, seen);
+  std::string stem = family.name + "_" + std::to_string(i);
+  std::replace(stem.begin(), stem.end(), ':', '_');
+  write_png(out / (stem + ".png"), shot.photo);
+  Job job({}, 1);
+  const calib::Detections found = family.detector.detect(shot.photo, job);
+  write_png(out / (stem + "_drawn.png"),
+            calib::draw_detections(shot.photo, Family::set_of(family.design), found));
+  std::printf("%s %zu: id %d, minor axis %.2f px, tilt %.1f°, blur %.2f px, noise %.4f%s%s%s%s\n", family.name.c_str(), i,
+              shot.id, seen.minor_px, seen.tilt_rad / kDegree, seen.blur_px, seen.noise, seen.wide ? ", 10 mm" : "",
+              seen.bayer ? ", Bayer" : "", seen.jpeg ? ", JPEG" : "", seen.occluded ? ", hidden" : "");
+  for (const calib::Detection& t : found.targets)
+    std::printf("  id %d, %zu features, corrected %d, erased %d, rms %.3f px\n", t.id, t.features.size(), t.corrected,
+                t.erased, t.rms_px);
+  const char* reasons[] = {"no code", "homography", "duplicate", "too few features", "unknown id"};
+  for (const calib::RefusedTarget& t : found.refused)
+    std::printf("  refused: %s at (%.1f, %.1f), %.1f px, id %d\n", reasons[std::size_t(t.reason)], t.pixel.x(), t.pixel.y(),
+                t.size_px, t.id);
+}
+
+std::vector<Render> study(const Family& family, std::size_t count, Job& job) {
   std::vector<Render> renders(count);
-  job.begin(name, count);
+  job.begin(family.name, count);
   parallel_chunks(
       job, count, kChunk,
       [&](std::size_t first, std::size_t last) {
         Job own({}, 1);
         std::unique_ptr<AprilTagPeer> april;
-        if (name == "apriltag:36h11") april = std::make_unique<AprilTagPeer>();
+        if (family.name == "apriltag:36h11") april = std::make_unique<AprilTagPeer>();
         for (std::size_t i = first; i < last; ++i) {
-          const std::uint64_t seed = test::Dice(s.seed * 0x100000001ull + i).next();
           Render& render = renders[i];
-          render.seen = draw(seed);
-          const int id = ids[std::size_t(seed >> 7) % ids.size()];
-          const test::TargetShot shot = test::photograph_target(design, id, render.seen, seed);
+          const test::TargetShot shot = family.shot(i, render.seen);
           render.width = shot.photo.width(), render.height = shot.photo.height();
           double start = cpu_ms();
-          const calib::Detections found = detector.detect(shot.photo, own);
+          const calib::Detections found = family.detector.detect(shot.photo, own);
           render.ms = cpu_ms() - start;
-          const test::Verdict verdict = test::judge(shot, design, found.targets);
+          const test::Verdict verdict = test::judge(shot, family.design, found.targets);
           render.ours = {verdict.found, verdict.wrong};
-          for (const calib::Detection& t : found.targets)
-            if (verdict.wrong)
-              std::fprintf(stderr, "wrong: %s seed %llu render %zu: id %d for %d, corrected %d, erased %d, rms %.3f px\n",
-                           name.c_str(), static_cast<unsigned long long>(s.seed), i, t.id, id, t.corrected, t.erased,
-                           t.rms_px);
-          if (!april && name != "aruco:6x6_250") continue;
+          if (verdict.wrong)
+            for (const calib::Detection& t : found.targets)
+              std::fprintf(stderr, "wrong: %s --seed %llu --only %zu: id %d for %d, corrected %d, erased %d, rms %.3f px\n",
+                           family.name.c_str(), static_cast<unsigned long long>(family.seed), i, t.id, shot.id, t.corrected,
+                           t.erased, t.rms_px);
+          if (!april && family.name != "aruco:6x6_250") continue;
           const Image grey = converted(shot.photo, PixelType::u8, 1);
           start = cpu_ms();
           render.peer = judge_tags(shot, april ? (*april)(grey) : aruco_tags(grey), render.seen.minor_px);
@@ -256,7 +303,14 @@ void run(const Settings& s) {
   cv::setNumThreads(1);
   std::vector<std::vector<Render>> all;
   all.reserve(s.families.size());
-  for (const std::string& name : s.families) all.push_back(study(name, s, s.renders / s.families.size(), job));
+  for (const std::string& name : s.families) {
+    const Family family(name, s.seed);
+    if (s.only)
+      show(family, *s.only, s.out);
+    else
+      all.push_back(study(family, s.renders / s.families.size(), job));
+  }
+  if (s.only) return;
 
   std::vector<Row> rows;
   std::string csv = "family,detector,minor_px,tilt_deg,blur_px,noise,wide,bayer,jpeg,occluded,width,height,found,wrong,ms\n";
@@ -343,6 +397,7 @@ int main(int argc, char** argv) {
   app.add_option("out", s.out, "folder for detection.csv and detection_{size,tilt,blur}.svg")->capture_default_str();
   app.add_option("--renders", s.renders, "of all families together")->capture_default_str();
   app.add_option("--families", s.families, "names of families")->delimiter(',')->capture_default_str();
+  app.add_option("--only", s.only, "number of the one render that is shown");
   app.add_option("--seed", s.seed, "of the renders")->capture_default_str();
   app.add_option("--threads", s.threads, "0: one for each core")->capture_default_str();
   CLI11_PARSE(app, argc, argv);

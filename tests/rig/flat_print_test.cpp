@@ -259,6 +259,62 @@ TEST(FlatPrint, PointGridsArePrintedWhereTheirPointsAre) {
   EXPECT_EQ(photo.row<float>(48)[3 * 52], 1);
 }
 
+TEST(FlatPrint, TargetsShowTheirCells) {
+  const auto linear = [](const calib::Rgb& c) { return linear_from_srgb(float(c[1]) / 255); };
+  for (const char* family : {"paper4x4", "matrix5x5", "matrix6x6", "apriltag:36h11", "aruco:6x6_250"})
+    for (const double stretch : {1., 1.02}) {
+      SCOPED_TRACE(family);
+      calib::TargetDesign design;
+      design.family = calib::TargetFamily::by_name(family);
+      design.scale_y = stretch;
+      const int id = design.family.ids()[7], n = design.family.grid();
+      const bool circles = design.family.kind() == calib::TargetKind::circles;
+      const double cell = circles ? design.size_m : design.size_m / n;
+      FlatPrint print = print_of(design, id);
+      print.world_from_print.translation = {0, 0, 1};
+      const View v = view(20 * (n + 4), 20 / cell);  // 20 px a cell
+      const Image photo = photograph(v, {print});
+      const auto cells = design.family.cells(id);
+      for (int i = 0; i < n * n; ++i) {
+        const Vector2d place = Vector2d(i % n - .5 * (n - 1), (i / n - .5 * (n - 1)) * stretch) * cell;
+        const Vector2d px = *v.camera.project({place.x(), place.y(), 1});
+        const float seen = photo.row<float>(int(px.y()))[3 * int(px.x()) + 1];
+        const bool light = cells[std::size_t(i)] == calib::Cell::light;
+        EXPECT_NEAR(seen, linear(light ? design.paper : design.ink), 1e-4) << i;
+        if (!circles) continue;
+        EXPECT_LT((place - design.feature(i)).norm(), 1e-12);
+        // Between a ring's edges and outside of it.
+        EXPECT_NEAR(photo.row<float>(int(px.y()))[3 * int(px.x() + 3) + 1], linear(design.ink), 1e-4);
+        EXPECT_NEAR(photo.row<float>(int(px.y()))[3 * int(px.x() + 7) + 1], linear(design.paper), 1e-4);
+      }
+      const double margin = circles ? 1 : 2;
+      EXPECT_NEAR(print.high.x(), (.5 * n + (circles ? .5 : margin)) * cell, 1e-12);
+      EXPECT_NEAR(print.high.y(), print.high.x(), 1e-12);  // as drawn
+    }
+}
+
+TEST(FlatPrint, StretchedCirclesAreEllipses) {
+  FlatPrint print = sheet(12 / 800.);
+  print.stretch = {1.1, .95};
+  const Moments seen = moments(photograph(view(), {print}, smooth()));
+  EXPECT_NEAR(seen.area / (M_PI * 12 * 12 * 1.1 * .95), 1, 1e-4);
+  EXPECT_LT((seen.center - Vector2d(50 + .0123 * 800, 50 - .0077 * 800)).norm(), 1e-3);
+}
+
+TEST(FlatPrint, SolidLightDiscsAreLighterThanThePaper) {
+  calib::TargetDesign design;
+  design.solid_light = true;
+  const FlatPrint print = print_of(design, design.family.ids()[5]);
+  EXPECT_EQ(print.shapes.size(), 25u);
+  const auto cells = design.family.cells(design.family.ids()[5]);
+  for (std::size_t i = 0; i < 25; ++i) {
+    if (cells[i] == calib::Cell::light)
+      EXPECT_GT(print.shapes[i].color.y(), print.paper.y() + .1);
+    else
+      EXPECT_LT(print.shapes[i].color.y(), print.paper.y() - .1);
+  }
+}
+
 TEST(FlatPrint, RefusesWhatMakesNoPicture) {
   const auto code = [](View v, FlatPrint print, PrintPhotoOptions options) {
     return test::expect_error([&] { photograph_prints(v, std::vector{print}, kBlack, options, 1); }).code();

@@ -58,7 +58,9 @@ class Sheet {
     const Eigen::Matrix3d r = cam_from_print.rotation.toRotationMatrix();
     const Vector3d t = cam_from_print.translation;
     distance_ = r.col(2).dot(t);
-    for (int i = 0; i < 2; ++i) from_ray_.row(i) = distance_ * r.col(i).transpose() - r.col(i).dot(t) * r.col(2).transpose();
+    for (int i = 0; i < 2; ++i)
+      from_ray_.row(i) =
+          (distance_ * r.col(i).transpose() - r.col(i).dot(t) * r.col(2).transpose()) / print.stretch[i];
     from_ray_.row(2) = r.col(2).transpose();
     front_ = distance_ > 0;
     if (!front_) from_ray_ = -from_ray_, distance_ = -distance_;

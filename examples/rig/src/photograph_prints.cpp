@@ -44,6 +44,7 @@ void check(const FlatPrint& print, std::size_t i) {
   if (!print.paper.allFinite()) refuse("paper is not finite", name);
   if (!(print.world_from_print.rotation.coeffs().allFinite() && print.world_from_print.translation.allFinite()))
     refuse("world_from_print is not finite", name);
+  if (!(print.stretch.allFinite() && print.stretch.minCoeff() > 0)) refuse("stretch must be finite, above 0", name);
   for (const FlatShape& s : print.shapes) {
     if (!s.color.allFinite()) refuse("a shape's colour is not finite", name);
     if (s.radius > 0 ? !(s.center.allFinite() && std::isfinite(s.radius)) : s.polygon.size() < 3)

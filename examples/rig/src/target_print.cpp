@@ -1,9 +1,6 @@
 #include <lumihull/base/image.h>
 #include <lumihull/rig/flat_print.h>
 
-#include <cmath>
-#include <utility>
-
 #include "flat_shapes.h"
 
 namespace lumihull::rig {
@@ -20,24 +17,6 @@ Vector3f linear(const calib::Rgb& c) {
           linear_from_srgb(float(c[2]) / 255.f)};
 }
 
-/// Corners of a circle that the print's scale made an ellipse: enough for 1e-6 of its radius.
-constexpr int kEllipseCorners = 2048;
-
-FlatShape scaled(FlatShape s, double x, double y) {
-  const Vector2d scale(x, y);
-  if (s.radius > 0 && x != y) {
-    for (int i = 0; i < kEllipseCorners; ++i) {
-      const double t = 2 * M_PI * i / kEllipseCorners;
-      s.polygon.push_back((s.center + s.radius * Vector2d(std::cos(t), std::sin(t))).cwiseProduct(scale));
-    }
-    s.radius = 0;
-    return s;
-  }
-  s.center = s.center.cwiseProduct(scale), s.radius *= x;
-  for (Vector2d& p : s.polygon) p = p.cwiseProduct(scale);
-  return s;
-}
-
 }  // namespace
 
 FlatPrint print_of(const TargetDesign& design, int id) {
@@ -45,7 +24,7 @@ FlatPrint print_of(const TargetDesign& design, int id) {
   const auto cells = design.family.cells(id);
   const int n = design.family.grid();
   const Vector3f ink = linear(design.ink), paper = linear(design.paper);
-  const Vector3f light = paper + .6f * (Vector3f::Ones() - paper);  // what is lighter than the paper
+  const Vector3f light = paper.cwiseMax(.85f);  // bare white paper amid what is printed as the paper's colour
   FlatPrint print;
   print.paper = paper;
   if (design.family.kind() == calib::TargetKind::circles) {
@@ -70,9 +49,7 @@ FlatPrint print_of(const TargetDesign& design, int id) {
               rectangle(corner + module * Vector2d(x, y), corner + module * Vector2d(end, y + 1), paper));
       }
   }
-  const Vector2d scale(design.scale_x, design.scale_y);
-  print.low = print.low.cwiseProduct(scale), print.high = print.high.cwiseProduct(scale);
-  for (FlatShape& s : print.shapes) s = scaled(std::move(s), design.scale_x, design.scale_y);
+  print.stretch = {design.scale_x, design.scale_y};
   return print;
 }
 

@@ -56,9 +56,20 @@ void extremes(const GreyLevel& level, Tiles& tiles, int row) {
   }
 }
 
+// Whether there is ink within three tiles. A ring whose wall is too thin to hold any is no larger than 9 px or so, and the
+// L, which does, is seldom more than a pitch away.
+bool ink_near(const Tiles& ink, int column, int row) {
+  constexpr int kReach = 3;
+  for (int r = std::max(0, row - kReach); r <= std::min(ink.rows - 1, row + kReach); ++r)
+    for (int c = std::max(0, column - kReach); c <= std::min(ink.columns - 1, column + kReach); ++c)
+      if (ink.low[ink.at(c, r)] < 128) return true;
+  return false;
+}
+
 // The threshold lies three quarters of the way up to the paper: there a small ring, blurred to half of its depth, is still
 // a spot. In sRGB's values that is about halfway in light. It stays clear of the paper's own noise.
-void choose_thresholds(Tiles& tiles, int row, const std::array<float, 8>& noise, int min_contrast) {
+// ink: its tiles, or null.
+void choose_thresholds(Tiles& tiles, int row, const std::array<float, 8>& noise, int min_contrast, const Tiles* ink) {
   for (int c = 0; c < tiles.columns; ++c) {
     std::uint8_t lo = 255, hi = 0;
     for (int r = std::max(0, row - 1); r <= std::min(tiles.rows - 1, row + 1); ++r)
@@ -70,6 +81,7 @@ void choose_thresholds(Tiles& tiles, int row, const std::array<float, 8>& noise,
     tiles.near_low[i] = lo;
     tiles.near_high[i] = hi;
     tiles.threshold[i] = 0;
+    if (ink && !ink_near(*ink, c, row)) continue;
     // Extremes of 576 values of noise lie about 6.2 standard deviations apart.
     const float sigma = noise[std::size_t((lo + hi) / 2 >> 5)], contrast = float(hi - lo);
     if (contrast < float(min_contrast) || contrast < 8 * sigma) continue;
@@ -310,8 +322,8 @@ std::vector<Blob> without_repeats(std::vector<Blob> blobs, int width, int height
         for (int i = head[std::size_t(y) * std::size_t(columns) + std::size_t(x)]; i >= 0; i = next[std::size_t(i)]) {
           const Blob& other = kept[std::size_t(i)];
           const double ratio = blob.a * blob.b / (other.a * other.b);
-          if ((blob.center - other.center).norm() < 0.3 * std::min(blob.b, other.b) + 0.5 && ratio < 1.7 &&
-              ratio > 0.6) {
+          if ((blob.center - other.center).norm() < 0.3 * std::min(blob.b, other.b) + 0.5 && ratio < 3 &&
+              ratio > 0.3) {
             repeated = true;
             break;
           }
@@ -327,43 +339,62 @@ std::vector<Blob> without_repeats(std::vector<Blob> blobs, int width, int height
 
 }  // namespace
 
-std::vector<Blob> find_blobs(const GreyPyramid& pyramid, const BlobOptions& options, Job& job) {
-  struct Part {
-    int level, first, last;
-  };
+namespace {
+
+struct Part {
+  int level, first, last;
+};
+
+// Tiles of all levels, their extremes filled in.
+std::vector<Tiles> tiles_of(const GreyPyramid& pyramid, std::vector<Part>& tile_rows, Job& job) {
+  constexpr int kTileRows = 16;
   std::vector<Tiles> tiles;
-  std::vector<Part> tile_rows, strips;
-  std::vector<std::array<float, 8>> noise;
+  tile_rows.clear();
   for (int l = 0; l < int(pyramid.size()); ++l) {
-    const GreyLevel& level = pyramid[std::size_t(l)];
-    tiles.emplace_back(level);
-    constexpr int kTileRows = 16;
+    tiles.emplace_back(pyramid[std::size_t(l)]);
     for (int r = 0; r < tiles.back().rows; r += kTileRows)
       tile_rows.push_back({l, r, std::min(r + kTileRows, tiles.back().rows)});
-    for (int y = 0; y < level.height; y += kStrip) strips.push_back({l, y, std::min(y + kStrip, level.height)});
-    noise.push_back(options.two_valued ? std::array<float, 8>{} : grey_noise(level));
   }
   parallel_for(job, tile_rows.size(), [&](std::size_t i) {
     const Part& p = tile_rows[i];
     for (int r = p.first; r < p.last; ++r) extremes(pyramid[std::size_t(p.level)], tiles[std::size_t(p.level)], r);
   });
+  return tiles;
+}
+
+}  // namespace
+
+std::vector<Blob> find_blobs(const GreyPyramid& grey, const GreyPyramid* ink, const BlobOptions& options, Job& job) {
+  if (grey.empty()) return {};
+  std::vector<Part> tile_rows, strips;
+  std::vector<Tiles> grey_tiles = tiles_of(grey, tile_rows, job), ink_tiles;
+  if (ink) ink_tiles = tiles_of(*ink, tile_rows, job);
+  std::vector<std::array<float, 8>> noise;
+  for (const GreyLevel& level : grey) noise.push_back(grey_noise(level));
   parallel_for(job, tile_rows.size(), [&](std::size_t i) {
     const Part& p = tile_rows[i];
-    for (int r = p.first; r < p.last; ++r)
-      choose_thresholds(tiles[std::size_t(p.level)], r, noise[std::size_t(p.level)], options.min_contrast);
+    const std::size_t l = std::size_t(p.level);
+    for (int r = p.first; r < p.last; ++r) {
+      choose_thresholds(grey_tiles[l], r, noise[l], options.min_contrast, ink ? &ink_tiles[l] : nullptr);
+      if (ink) choose_thresholds(ink_tiles[l], r, {}, options.min_contrast, nullptr);
+    }
   });
-  std::vector<std::vector<Blob>> found(strips.size());
-  parallel_for(job, strips.size(), [&](std::size_t i) {
-    const Part& p = strips[i];
+  for (int l = 0; l < int(grey.size()); ++l)
+    for (int y = 0; y < grey[std::size_t(l)].height; y += kStrip)
+      strips.push_back({l, y, std::min(y + kStrip, grey[std::size_t(l)].height)});
+  const std::size_t kinds = ink ? 2 : 1;
+  std::vector<std::vector<Blob>> found(kinds * strips.size());
+  parallel_for(job, found.size(), [&](std::size_t i) {
+    const Part& p = strips[i % strips.size()];
+    const std::size_t l = std::size_t(p.level);
     const double least = p.level == 0 ? 0.75 * options.min_circle_px
                                       : std::max(kSmallestMinor, 0.75 * std::ldexp(options.min_circle_px, -p.level));
-    found[i] = blobs_of_strip(pyramid[std::size_t(p.level)], tiles[std::size_t(p.level)], p.level, p.first, p.last,
-                              least);
+    found[i] = i < strips.size() ? blobs_of_strip(grey[l], grey_tiles[l], p.level, p.first, p.last, least)
+                                 : blobs_of_strip((*ink)[l], ink_tiles[l], p.level, p.first, p.last, least);
   });
   std::vector<Blob> all;
   for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
-  if (pyramid.empty()) return all;
-  return without_repeats(std::move(all), pyramid[0].width, pyramid[0].height);
+  return without_repeats(std::move(all), grey[0].width, grey[0].height);
 }
 
 }  // namespace lumihull::calib

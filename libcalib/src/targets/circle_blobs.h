@@ -23,13 +23,15 @@ struct Blob {
 struct BlobOptions {
   double min_circle_px = 4.5;  ///< smallest minor axis (full), px of the photograph
   int min_contrast = 12;       ///< grey values
-  bool two_valued = false;     ///< the pyramid comes from a key: no noise
 };
 
-/// Dark ellipses of all sizes. Each level is thresholded halfway between the smallest and the largest value of 3 x 3 tiles
-/// of 8 x 8 px, where these differ by more than noise does, and looked through for spots of 4 to 40 px: so that a circle of
-/// any size is seen where the threshold is as local as the circle is small. What two levels see is kept once. Ordered by
-/// level, then by place; does not depend on the number of threads.
-std::vector<Blob> find_blobs(const GreyPyramid& pyramid, const BlobOptions& options, Job& job);
+/// Dark ellipses of all sizes. Each level is thresholded between the smallest and the largest value of 3 x 3 tiles of 8 x 8
+/// px, where these differ by more than noise does, and looked through for spots of 4 to 40 px: so that a circle of any size
+/// is seen where the threshold is as local as the circle is small. What two levels see is kept once. Ordered by level, then
+/// by place; does not depend on the number of threads.
+///
+/// ink: of the same size, 0 = ink by its key, or null. Where it is given, spots are looked for in it and in `grey` close to
+/// ink: the key tells where, but a small ring's wall is a mixture of colours, and not ink to it.
+std::vector<Blob> find_blobs(const GreyPyramid& grey, const GreyPyramid* ink, const BlobOptions& options, Job& job);
 
 }  // namespace lumihull::calib

@@ -179,7 +179,13 @@ class Grower {
       const auto it = at.find({x, y});
       return it == at.end() ? -1 : it->second;
     };
-    while (!open.empty()) {
+    bool everywhere = false;  // the last resort: steps from farther away
+    for (;;) {
+      if (open.empty()) {
+        if (everywhere || at.size() < 6) break;
+        everywhere = true;
+        for (const auto& [p, blob] : at) open.push(p);
+      }
       const auto [x, y] = open.front();
       open.pop();
       const int self = find(x, y);
@@ -204,6 +210,17 @@ class Grower {
             sum += center(self) + center(q) - center(p);
             ++ways;
           }
+        }
+        if (ways == 0 && everywhere) {
+          for (int r = 2; r <= 3 && ways == 0; ++r)
+            for (int oy = -r; oy <= r; ++oy)
+              for (int ox = -r; ox <= r; ++ox) {
+                if (std::max(std::abs(ox), std::abs(oy)) != r) continue;
+                const int p = find(x + ox, y + oy), q = find(nx + ox, ny + oy);
+                if (p < 0 || q < 0) continue;
+                sum += center(self) + center(q) - center(p);
+                ++ways;
+              }
         }
         if (ways == 0) continue;
         const int next = nearest(sum / ways, self, 0.25 * pitch_);

@@ -154,18 +154,17 @@ void TargetDetector::Impl::find_circles(const Image& photo, Job& job, Detections
     throw Error(ErrorCode::invalid_argument, "a key for ink needs a colour photograph (3 channels)", "target detection");
   std::vector<WindowResult> results;
   std::vector<Blob> blobs;
+  GreyPyramid ink;
   LightPlane plane;
   for (std::size_t s = 0; s < searches.size(); ++s) {
     const Search& search = searches[s];
     if (s == 0 || search.weights != searches[s - 1].weights) {
       plane = {};
-      const GreyPyramid pyramid =
-          options.ink_key ? key_pyramid(bytes, *options.ink_key, job)
-                          : grey_pyramid(bytes, {search.weights[0], search.weights[1], search.weights[2]}, job);
+      const GreyPyramid grey = grey_pyramid(bytes, {search.weights[0], search.weights[1], search.weights[2]}, job);
+      if (options.ink_key && s == 0) ink = key_pyramid(bytes, *options.ink_key, job);
       BlobOptions blob_options;
       blob_options.min_circle_px = options.min_circle_px;
-      blob_options.two_valued = options.ink_key.has_value();
-      blobs = find_blobs(pyramid, blob_options, job);
+      blobs = find_blobs(grey, options.ink_key ? &ink : nullptr, blob_options, job);
     }
     int least = 1000;
     for (const int d : search.designs) least = std::min(least, set.designs[std::size_t(d)].family.grid());

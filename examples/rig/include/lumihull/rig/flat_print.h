@@ -26,10 +26,11 @@ struct FlatPrint {
   Eigen::Vector3f paper{.8f, .8f, .8f};
   std::vector<FlatShape> shapes;
   Pose world_from_print;
+  Eigen::Vector2d stretch{1, 1};  ///< of the print along x and y: true length over drawn length; all else is as drawn
 };
 
 /// A target as printed, with a margin of paper around it (circles: half a pitch beyond the outer circles' pitch square, so
-/// that the sheet is grid + 1 pitches wide; squares: two modules), its frame that of TargetDesign, the print's scale applied.
+/// that the sheet is grid + 1 pitches wide; squares: two modules), its frame that of TargetDesign; `stretch` is its scale.
 /// Ink and paper are the design's sRGB colours in linear light. Errors: those of TargetDesign::validate and
 /// TargetFamily::cells.
 FlatPrint print_of(const calib::TargetDesign& design, int id);
