@@ -1,11 +1,11 @@
 #include "clutter.h"
 
+#include <cairo.h>
 #include <lumihull/rig/flat_print.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <cairo.h>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -100,7 +100,9 @@ Image salt(int size, Dice& dice) {
 class Canvas {
  public:
   explicit Canvas(int size)
-      : size_(size), surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, size, size)), cr_(cairo_create(surface_)) {}
+      : size_(size),
+        surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, size, size)),
+        cr_(cairo_create(surface_)) {}
   Canvas(const Canvas&) = delete;
   Canvas& operator=(const Canvas&) = delete;
   ~Canvas() { cairo_destroy(cr_), cairo_surface_destroy(surface_); }
@@ -184,7 +186,9 @@ Image text(int size, Dice& dice) {
     for (int n = int(3.2 * size / height); n-- > 0;) {
       const bool r = dice.chance(all_round);
       const std::string& from = r ? round : letters;
-      line += r && same ? sign : dice.chance(.12) && all_round < 1 ? ' ' : from[std::size_t(dice.below(int(from.size())))];
+      line += r && same                           ? sign
+              : dice.chance(.12) && all_round < 1 ? ' '
+                                                  : from[std::size_t(dice.below(int(from.size())))];
     }
     cairo_move_to(cr, -.75 * size, y), cairo_show_text(cr, line.c_str());
   }
@@ -277,8 +281,9 @@ Image perforated(int size, Dice& dice) {
   print.world_from_print.rotation =
       Eigen::Quaterniond(Eigen::AngleAxisd(dice.between(0, 1.2), Vector3d(std::cos(axis), std::sin(axis), 0)) *
                          Eigen::AngleAxisd(dice.between(0, 2 * pi), Vector3d::UnitZ()));
-  print.world_from_print.translation = Vector3d(0, 0, view.camera.f / pitch_px) -
-                                       print.world_from_print.rotation * Vector3d((columns - 1) / 2., (rows - 1) / 2., 0);
+  print.world_from_print.translation =
+      Vector3d(0, 0, view.camera.f / pitch_px) -
+      print.world_from_print.rotation * Vector3d((columns - 1) / 2., (rows - 1) / 2., 0);
   rig::PrintPhotoOptions options;
   options.blur_px = dice.between(0, 2), options.noise_read = dice.between(0, .02);
   const float ground = float(dice.between(.02, .9));
@@ -298,13 +303,14 @@ Image tiles(int size, Dice& dice) {
   for (int j = -n; j < n; ++j)
     for (int i = -n; i < n; ++i) {
       const double x = i * p, y = j * p;
-      if (kind == 0 && (i + j) % 2 == 0) box(x, y, p, p);                           // chessboard
-      if (kind == 1) box(x + .1 * p, y + .1 * p, .8 * p, .8 * p);                   // windows
+      if (kind == 0 && (i + j) % 2 == 0) box(x, y, p, p);                            // chessboard
+      if (kind == 1) box(x + .1 * p, y + .1 * p, .8 * p, .8 * p);                    // windows
       if (kind == 2 && j == -n) box(x, -size, p * dice.between(.1, .9), 2. * size);  // barcode
       if (kind == 3 && dice.chance(.5)) box(x, y, p + .5, p + .5);                   // random modules
       if (kind == 4 && i % 4 == 0 && j % 4 == 0) {                                   // squares in squares
         box(x, y, 3 * p, 3 * p);
-        cairo_set_source_rgb(cr, .9, .9, .9), box(x + .5 * p, y + .5 * p, 2 * p, 2 * p), cairo_set_source_rgb(cr, g, g, g);
+        cairo_set_source_rgb(cr, .9, .9, .9), box(x + .5 * p, y + .5 * p, 2 * p, 2 * p),
+            cairo_set_source_rgb(cr, g, g, g);
         if (dice.chance(.7)) box(x + p, y + p, p, p);
       }
     }
@@ -325,7 +331,8 @@ Image crop(int size, Dice& dice, std::span<const Image> photographs) {
       std::array<double, 3> sum{};
       for (int j = 0; j < taps; ++j)
         for (int i = 0; i < taps; ++i) {
-          const double u = (mirrored ? -1 : 1) * (x - size / 2.) + blur * (i - (taps - 1) / 2), v = y - size / 2. + blur * (j - (taps - 1) / 2);
+          const double u = (mirrored ? -1 : 1) * (x - size / 2.) + blur * (i - (taps - 1) / 2),
+                       v = y - size / 2. + blur * (j - (taps - 1) / 2);
           const double px = std::clamp(middle.x() + c * u - s * v, 0., from.width() - 1.001),
                        py = std::clamp(middle.y() + s * u + c * v, 0., from.height() - 1.001);
           const int k = int(px), l = int(py);
@@ -345,24 +352,35 @@ Image crop(int size, Dice& dice, std::span<const Image> photographs) {
 }  // namespace
 
 std::string clutter_name(Clutter kind) {
-  static const std::array<std::string, kClutterKinds> names{"white noise", "pink noise", "salt",       "strokes", "text",
-                                                            "leaves",      "halftone",   "perforated", "tiles",   "photographs"};
+  static const std::array<std::string, kClutterKinds> names{"white noise", "pink noise", "salt",     "strokes",
+                                                            "text",        "leaves",     "halftone", "perforated",
+                                                            "tiles",       "photographs"};
   return names[std::size_t(kind)];
 }
 
 Image clutter(Clutter kind, int size, std::uint64_t seed, std::span<const Image> photographs) {
   Dice dice(seed * std::uint64_t(kClutterKinds) + std::uint64_t(kind));
   switch (kind) {
-    case Clutter::white_noise: return noise(size, dice);
-    case Clutter::pink_noise: return pink(size, dice);
-    case Clutter::salt: return salt(size, dice);
-    case Clutter::strokes: return strokes(size, dice);
-    case Clutter::text: return text(size, dice);
-    case Clutter::leaves: return leaves(size, dice);
-    case Clutter::halftone: return halftone(size, dice);
-    case Clutter::perforated: return perforated(size, dice);
-    case Clutter::tiles: return tiles(size, dice);
-    case Clutter::photographs: return crop(size, dice, photographs);
+    case Clutter::white_noise:
+      return noise(size, dice);
+    case Clutter::pink_noise:
+      return pink(size, dice);
+    case Clutter::salt:
+      return salt(size, dice);
+    case Clutter::strokes:
+      return strokes(size, dice);
+    case Clutter::text:
+      return text(size, dice);
+    case Clutter::leaves:
+      return leaves(size, dice);
+    case Clutter::halftone:
+      return halftone(size, dice);
+    case Clutter::perforated:
+      return perforated(size, dice);
+    case Clutter::tiles:
+      return tiles(size, dice);
+    case Clutter::photographs:
+      return crop(size, dice, photographs);
   }
   return {};
 }
