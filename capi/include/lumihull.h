@@ -7,7 +7,7 @@
  *   the context holds a one-line message and the subject (a file, a photograph) that it is about. No call throws,
  *   and no argument of documented type crashes it, except a pointer to memory that is not the caller's.
  * - One context a thread at a time. Handles (lh_capture, lh_mesh, …) belong to no context. lh_image, lh_color_key,
- *   lh_mesh and lh_ray_scene never change once they are made: any number of threads may read one. The others:
+ *   lh_mesh, lh_ray_scene and lh_target_set never change once they are made: any number of threads may read one. The others:
  *   one thread at a time.
  * - Arrays and strings that the caller passes are borrowed for the call. Strings are UTF-8 and end with NUL.
  * - Results of unknown length are read in two calls: first with a NULL buffer, which stores the size in *needed, then

@@ -5,10 +5,14 @@
 #include <lumihull/base/capture.h>
 #include <lumihull/base/image.h>
 #include <lumihull/calib/color_key.h>
+#include <lumihull/calib/detect_targets.h>
+#include <lumihull/calib/target_set.h>
+#include <lumihull/calib/lens_calibration.h>
 #include <lumihull/hull/mesh.h>
 #include <lumihull/hull/ray_scene.h>
 
 #include <cstddef>
+#include <vector>
 
 struct lh_image {
   lumihull::Image value;
@@ -16,6 +20,10 @@ struct lh_image {
 
 struct lh_color_key {
   lumihull::calib::ColorKey value;
+};
+
+struct lh_target_set {
+  lumihull::calib::TargetSet value;
 };
 
 struct lh_mesh {
@@ -28,4 +36,17 @@ struct lh_ray_scene {
 
 struct lh_capture {
   lumihull::Capture value;
+};
+
+struct lh_target_detector {
+  lumihull::calib::TargetDetector value;
+};
+
+struct lh_detections {
+  lumihull::calib::Detections value;
+};
+
+struct lh_lens {
+  lumihull::calib::LensCalibration value;
+  std::vector<std::size_t> first;  ///< of each view's points, and their number at the end
 };

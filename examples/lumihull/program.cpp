@@ -129,6 +129,9 @@ int Program::run(int argc, char** argv) {
   add_run(*this);
   add_export(*this);
   add_info(*this);
+  add_intrinsics(*this);
+  add_targets(*this);
+  add_detect(*this);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

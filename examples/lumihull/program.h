@@ -86,5 +86,8 @@ void add_render(Program& program);
 void add_evaluate(Program& program);
 void add_run(Program& program);
 void add_info(Program& program);
+void add_intrinsics(Program& program);
+void add_targets(Program& program);
+void add_detect(Program& program);
 
 }  // namespace lumihull::program

@@ -47,6 +47,53 @@ static void pose(lh_context *ctx) {
   CHECK_SAYS(ctx, "up");
 }
 
+static void resect(lh_context *ctx) {
+  const double eye[3] = {1, -5, 2}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+  lh_camera c = small_camera(3000, 2000, 2500);
+  double truth[12], found[12], world[3 * 27], local[3 * 27], pixels[2 * 27], covariances[4 * 27];
+  uint8_t outlier[27];
+  lh_resect_options options;
+  lh_resection result;
+  size_t i, k;
+  c.k1 = 0.05;
+  MUST(ctx, lh_pose_look_at(ctx, eye, target, up, truth));
+  for (i = 0; i < 27; ++i) {
+    world[3 * i] = (double)(i % 3) - 1, world[3 * i + 1] = (double)(i / 3 % 3) - 1, world[3 * i + 2] = (double)(i / 9) - 1;
+    for (k = 0; k < 3; ++k)
+      local[3 * i + k] = truth[4 * k] * world[3 * i] + truth[4 * k + 1] * world[3 * i + 1] +
+                         truth[4 * k + 2] * world[3 * i + 2] + truth[4 * k + 3];
+    covariances[4 * i] = covariances[4 * i + 3] = 0.01, covariances[4 * i + 1] = covariances[4 * i + 2] = 0.001;
+  }
+  MUST(ctx, lh_camera_project(ctx, &c, local, 27, pixels, NULL));
+  MUST(ctx, lh_resect(ctx, &c, pixels, world, 27, NULL, found, NULL, NULL));
+  for (i = 0; i < 12; ++i) CHECK(fabs(found[i] - truth[i]) < 1e-9);
+
+  /* All that there is: a wrong match is named, the covariance is symmetric. */
+  pixels[2 * 5] += 40;
+  memset(&options, 0, sizeof options);
+  options.struct_size = sizeof options;
+  options.covariances = covariances;
+  memset(&result, 0, sizeof result);
+  result.struct_size = sizeof result;
+  MUST(ctx, lh_resect(ctx, &c, pixels, world, 27, &options, found, &result, outlier));
+  for (i = 0; i < 12; ++i) CHECK(fabs(found[i] - truth[i]) < 1e-9);
+  for (i = 0; i < 27; ++i) CHECK(outlier[i] == (i == 5));
+  CHECK(result.outliers == 1 && result.rms_px < 1e-6 && !result.has_alternative);
+  for (i = 0; i < 6; ++i) CHECK(result.covariance[7 * i] > 0 && result.covariance[i] == result.covariance[6 * i]);
+  options.not_robust = 1;
+  MUST(ctx, lh_resect(ctx, &c, pixels, world, 27, &options, found, &result, outlier));
+  CHECK(result.outliers == 0 && result.sigma0 > 10);
+
+  EXPECT(ctx, LH_EINVAL, lh_resect(ctx, &c, pixels, world, 3, NULL, found, NULL, NULL));
+  EXPECT(ctx, LH_EINVAL, lh_resect(ctx, &c, NULL, world, 27, NULL, found, NULL, NULL));
+  options.radii = covariances;
+  EXPECT(ctx, LH_EINVAL, lh_resect(ctx, &c, pixels, world, 27, &options, found, NULL, NULL));
+  CHECK_SAYS(ctx, "normals");
+  for (i = 0; i < 27; ++i) world[3 * i] = world[3 * i + 1] = world[3 * i + 2] = (double)i;
+  EXPECT(ctx, LH_EDEGENERATE, lh_resect(ctx, &c, pixels, world, 27, NULL, found, NULL, NULL));
+  CHECK_SAYS(ctx, "line");
+}
+
 static void image(lh_context *ctx, const char *scratch) {
   uint8_t pixels[4 * 3 * 3 + 4 * 3];
   const uint8_t *data;
@@ -243,6 +290,7 @@ int main(int argc, char **argv) {
   versions();
   camera(ctx);
   pose(ctx);
+  resect(ctx);
   image(ctx, scratch);
   color_key(ctx, scratch);
   mesh_and_rays(ctx, scratch);

@@ -162,3 +162,37 @@ def test_metrics() -> None:
     assert np.isnan(lumihull.psnr(a, b, mask))
     mask[:8] = 255
     assert lumihull.silhouette_iou(mask, np.roll(mask, 4, axis=0)) == pytest.approx(1 / 3)
+
+
+def test_resect_finds_the_pose_and_names_what_is_wrong() -> None:
+    random = np.random.default_rng(2)
+    camera = lumihull.Camera(3000, 2000, 2500, k1=0.05, p1=1e-3)
+    pose = lumihull.Pose.look_at([1, -5, 2], [0, 0, 0], [0, 0, 1])
+    world = random.uniform(-1, 1, size=(40, 3))
+    pixels = camera.project(pose.apply(world))
+    exact = lumihull.resect(camera, pixels, world)
+    assert np.allclose(exact.pose.matrix, pose.matrix, atol=1e-9)
+    assert exact.rms_px < 1e-6 and len(exact.outliers) == 0 and exact.alternative is None
+
+    noisy = pixels + random.normal(scale=0.05, size=pixels.shape)
+    noisy[[3, 17]] += 20
+    covariances = np.broadcast_to(0.05**2 * np.eye(2), (40, 2, 2))
+    found = lumihull.resect(camera, noisy, world, covariances)
+    assert list(found.outliers) == [3, 17]
+    assert 0.7 < found.sigma0 < 1.3 and found.iterations > 0
+    assert np.allclose(found.covariance, found.covariance.T) and (np.linalg.eigvalsh(found.covariance) > 0).all()
+    assert np.allclose(found.pose.center, pose.center, atol=1e-3)
+    assert lumihull.resect(camera, noisy, world, robust=False).rms_px > 1
+
+    normals = np.broadcast_to([0.0, -1, 0], (40, 3))
+    assert lumihull.resect(camera, pixels, world, radii=np.full(40, 1e-6), normals=normals).rms_px < 1e-6
+    for arguments, options, code in [
+        ((pixels[:3], world[:3]), {}, "invalid_argument"),
+        ((pixels, world[:3]), {}, "invalid_argument"),
+        ((pixels, world, np.eye(2)), {}, "invalid_argument"),
+        ((pixels, world), {"radii": np.ones(40)}, "invalid_argument"),
+        ((pixels, np.linspace(0, 1, 40)[:, None] * np.ones(3)), {}, "degenerate"),
+    ]:
+        with pytest.raises(lumihull.Error) as caught:
+            lumihull.resect(camera, *arguments, **options)
+        assert caught.value.code == code

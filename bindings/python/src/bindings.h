@@ -27,6 +27,10 @@ void bind_base(py::module_& module);
 void bind_model(py::module_& module);
 void bind_capture(py::module_& module);
 void bind_views(py::module_& module);
+void bind_detections(py::module_& module);
+void bind_targets(py::module_& module);
+void bind_resect(py::module_& module);
+void bind_lens(py::module_& module);
 
 [[noreturn]] inline void invalid(const std::string& message, const char* argument) {
   throw Error(ErrorCode::invalid_argument, message, argument);

@@ -169,4 +169,8 @@ PYBIND11_MODULE(_lumihull, module) {
   python::bind_model(module);
   python::bind_capture(module);
   python::bind_views(module);
+  python::bind_targets(module);
+  python::bind_detections(module);
+  python::bind_resect(module);
+  python::bind_lens(module);
 }

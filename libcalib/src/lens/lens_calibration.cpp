@@ -5,6 +5,7 @@
 #include <lumihull/calib/lens_calibration.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -64,7 +64,7 @@ LensCovariance lens_covariance(const Camera& camera, const std::vector<FittedVie
                                   unit.asDiagonal();
   for (Eigen::Index i = 0; i < n; ++i)
     for (Eigen::Index j = 0; j < n; ++j)
-      result.covariance(columns[std::size_t(i)], columns[std::size_t(j)]) = inverse(i, j);
+      result.covariance(columns[std::size_t(i)], columns[std::size_t(j)]) = 0.5 * (inverse(i, j) + inverse(j, i));
   return result;
 }
 

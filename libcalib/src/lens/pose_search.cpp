@@ -35,7 +35,7 @@ class Search {
           for (std::size_t c = b + 1; c < n; ++c) try_sample({usable_[a], usable_[b], usable_[c]});
       return std::move(best_);
     }
-    constexpr int kMost = 4000, kLeast = 8;
+    constexpr int kMost = 2000, kLeast = 8;
     double needed = kMost;
     for (int i = 0; i < kMost && (i < kLeast || i < needed); ++i) {
       std::array<std::size_t, 3> sample;

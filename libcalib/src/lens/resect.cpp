@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "lens/linear_pose.h"
 #include "lens/pose_fit.h"
@@ -29,6 +30,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kFlat = 0.02, kNearlyFlat = 0.2;
 /// Matches agree if their residuals' scale is below this share of the picture that they cover.
 constexpr double kAgreement = 0.02;
+/// Residuals that are larger than their covariances say by this factor may be those of many wrong matches.
+constexpr double kSuspicious = 3;
+/// log10 of the number of false alarms below which matches agree by more than chance.
+constexpr double kCertain = -3;
 
 double angle_between(const LocalPose& a, const LocalPose& b) {
   return Eigen::AngleAxisd(Matrix3d(a.rotation.transpose() * b.rotation)).angle();
@@ -56,7 +61,8 @@ class Resecting {
 
   Resection run() {
     Selection best;
-    if (!from_all(best) && !from_samples(best)) {
+    if (!from_all(best) && !from_samples(best) && fallback_) best = std::move(*fallback_);
+    if (best.count == 0) {
       if (reflected_)
         degenerate(
             "the points lie behind the camera, or the world is mirrored: expected a right-handed world, z forward");
@@ -94,7 +100,8 @@ class Resecting {
 
   /// Least squares over all matches from the linear start; with robust, those that don't fit are left out as long as
   /// they are few. true if the answer can be trusted.
-  bool from_all(Selection& s) {
+  bool from_all(Selection& answer) {
+    Selection s;
     s.weights = points_.seen;
     s.count = seen_;
     std::array<LocalPose, 2> starts;
@@ -113,15 +120,22 @@ class Resecting {
     squared_distances(points_, s.fit.pose, d2_);
     s.scale = scale_of(s.weights);
     if (!agrees(s)) return false;
-    if (!robust_) return true;
+    if (!robust_) return answer = std::move(s), true;
+    fallback_ = s;
+    if (s.scale > kSuspicious * (1 + 5 / std::max(1.0, 2.0 * s.count - 6))) return false;
     std::vector<double> weights(s.weights.size(), 0);
-    if (select(s.scale, weights) == s.count) return true;
+    if (select(s.scale, weights) == s.count) return answer = std::move(s), true;
     Selection robust = s;
     return settle(robust, s.scale) && robust.count >= 0.85 * double(matches_.size()) && agrees(robust) &&
-           (s = std::move(robust), true);
+           log_false_alarms(robust) < kCertain && (answer = std::move(robust), true);
   }
 
-  bool agrees(const Selection& s) const { return s.scale * sigma_px_ <= kAgreement * points_.spread_px; }
+  /// Residuals are small beside the picture, or as small as their covariances say (with few points the scale has a
+  /// factor for its uncertainty).
+  bool agrees(const Selection& s) const {
+    return s.scale * sigma_px_ <= kAgreement * points_.spread_px ||
+           s.scale <= 2 * (1 + 5 / std::max(1.0, 2.0 * s.count - 6));
+  }
 
   /// Robust loss from a pose near the answer, then least squares on the matches that agree until they stay the same.
   bool settle(Selection& s, double scale) {
@@ -129,17 +143,25 @@ class Resecting {
     s.weights.assign(points_.seen.size(), 0);
     if (select(scale, s.weights) < 4) return false;
     s.scale = std::min(scale, scale_of(s.weights));
-    minimise(points_, points_.seen, 2 * s.scale, options_.max_iterations, true, s.fit);
-    std::vector<double> before;
-    for (int round = 0; round < 12 && before != s.weights; ++round) {
+    for (int round = 0; round < 6; ++round) {
+      minimise(points_, points_.seen, 2 * s.scale, options_.max_iterations, true, s.fit);
       squared_distances(points_, s.fit.pose, d2_);
-      before = s.weights;
-      if (round > 0) s.scale = scale_of(s.weights);
+      if (select(s.scale, s.weights) < 4) return false;
+      const double before = std::exchange(s.scale, scale_of(s.weights));
+      if (std::abs(s.scale - before) <= 1e-3 * before) break;
+    }
+    std::vector<double> before;
+    for (int round = 0; round < 12; ++round) {
       s.count = select(s.scale, s.weights);
       if (s.count < 4) return false;
+      if (s.weights == before) break;
       minimise(points_, s.weights, 0, options_.max_iterations, true, s.fit);
+      squared_distances(points_, s.fit.pose, d2_);
+      // From all their residuals: less uncertain than a median, which has done its work.
+      const double freedom = 2.0 * s.count - 6;
+      s.scale = std::max(std::sqrt(s.fit.at.cost / freedom) * (1 + 5 / freedom), 1e-6 / sigma_px_);
+      before = s.weights;
     }
-    squared_distances(points_, s.fit.pose, d2_);
     return std::isfinite(s.fit.at.cost);
   }
 
@@ -158,15 +180,21 @@ class Resecting {
     // What the lens does to ellipses is not yet known.
     const double slack_px = points_.circles && !points_.lens.empty() ? 0.3 : 0;
     const double least = std::hypot(1.0, slack_px / sigma_px_ / options_.outlier_sigma);
-    const double most = kAgreement * points_.spread_px / sigma_px_;
+    const double most = std::max(kAgreement * points_.spread_px / sigma_px_, 1.0);
     bool found = false;
     for (double scale = std::min(least, most); scale <= most; scale *= 5) {
       const auto candidates = search_pose(points_, limit_of(scale), options_.seed, matches_.size() <= 7 ? 4 : 2);
       for (const PoseCandidate& candidate : candidates) {
         Selection s;
         s.fit.pose = candidate.pose;
-        if (!(robust_ ? settle(s, scale) : all_from(s)) || !s.fit.regular) continue;
-        if (s.count < int(matches_.size()) && log_false_alarms(s) > -3) continue;
+        bool good = robust_ ? settle(s, scale) : all_from(s);
+        // Few matches: leaving one out is no better than chance, but all of them may agree.
+        if (!good || (s.count < int(matches_.size()) && log_false_alarms(s) > kCertain)) {
+          // Few matches: leaving one out is no better than chance, but all of them may agree.
+          s.fit.pose = candidate.pose;
+          good = matches_.size() <= 7 && seen_ == int(matches_.size()) && all_from(s);
+        }
+        if (!good || !s.fit.regular) continue;
         if (!agrees(s)) continue;
         const bool same_matches = found && s.weights == best.weights;
         const bool better =
@@ -266,6 +294,7 @@ class Resecting {
   double sigma_px_ = 0;  ///< RMS of the matches' standard deviations
   bool reflected_ = false;
   std::vector<double> d2_, ordered_;
+  std::optional<Selection> fallback_;  ///< all matches, where leaving some out can't be justified
   std::optional<LocalPose> runner_up_, alternative_;
   double alternative_ratio_ = 0;
 };

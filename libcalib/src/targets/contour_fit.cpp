@@ -15,6 +15,7 @@ constexpr int kSize = ContourModel::kSize;
 // so that where the picture shows more it is believed.
 constexpr double kLightChange = 1e-4;
 constexpr double kRatioSd = 0.03;  // of a ring's ratio, a priori: ink spreads
+constexpr double kLeastRaise = 1.2;  // of the noise: less may be chance
 constexpr int kFlush = 32;         // blocks that are summed in float
 
 }  // namespace
@@ -87,9 +88,10 @@ void ContourFit::expect(const ContourModel& model, double inner_ratio) {
 
 void ContourFit::weigh() {
   pixels_ = clipped_ = 0;
+  const double scale = noise_scale_ * noise_scale_;
   for (Block& block : blocks_)
     for (int i = 0; i < kLanes; ++i) {
-      const double v = double(block.expected[i]), variance = std::max(1e-14, plane_.noise.variance(v));
+      const double v = double(block.expected[i]), variance = std::max(1e-14, scale * plane_.noise.variance(v));
       // By the model, not only by the value: to leave out those that noise has lifted would pull the level down.
       const bool clipped = block.value[i] >= plane_.saturation || v > double(plane_.saturation) - 2 * std::sqrt(variance);
       const bool counts = i < block.count && !clipped && sectors_[block.sector[std::size_t(i)]].used;
@@ -243,12 +245,31 @@ void ContourFit::measure_sectors(double tolerance) {
   }
 }
 
+bool ContourFit::raise_noise(double most) {
+  // Pixels beside each other in a row: what is wrong with the model changes slowly from one to the next, noise does not.
+  scratch_.clear();
+  for (const Block& block : blocks_)
+    for (int i = 0; i + 1 < block.count; ++i)
+      if (block.pixels.x[i + 1] - block.pixels.x[i] == 1 && block.pixels.y[i + 1] == block.pixels.y[i] &&
+          block.value[i] < plane_.saturation && block.value[i + 1] < plane_.saturation)
+        scratch_.push_back(std::abs(block.value[i + 1] - block.expected[i + 1] - block.value[i] + block.expected[i]) /
+                           std::sqrt(block.variance[i] + block.variance[i + 1]));
+  const double scale = std::min(noise_scale_ * std::min(median_scale(), robust_scale()), most);
+  if (!(scale >= kLeastRaise * noise_scale_)) return false;
+  noise_scale_ = scale;
+  return true;
+}
+
 double ContourFit::robust_scale() {
   scratch_.clear();
   for (const Block& block : blocks_)
     for (int i = 0; i < block.count; ++i)
       if (block.value[i] < plane_.saturation)
         scratch_.push_back(std::abs(block.value[i] - block.expected[i]) / std::sqrt(block.variance[i]));
+  return median_scale();
+}
+
+double ContourFit::median_scale() {
   if (scratch_.empty()) return 0;
   const auto middle = scratch_.begin() + std::ptrdiff_t(scratch_.size() / 2);
   std::nth_element(scratch_.begin(), middle, scratch_.end());

@@ -27,7 +27,7 @@ EdgeProfile::EdgeProfile(const Eigen::Vector2d& normal, double sigma) : sigma_(s
   const double wide = std::max(std::abs(normal.x()), std::abs(normal.y()));
   const double narrow = std::min(std::abs(normal.x()), std::abs(normal.y()));
   reach_ = 6 * sigma + 0.75;
-  step_ = std::min(0.25, sigma / 6);
+  step_ = std::min(0.25, sigma / 4);
   const int half = int(std::ceil(reach_ / step_));
   reach_ = half * step_;
   nodes_.resize(std::size_t(2 * half + 2));

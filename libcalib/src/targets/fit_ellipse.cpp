@@ -20,6 +20,7 @@ constexpr double kTolerance = 0.02, kSectorTolerance = 0.005;
 constexpr double kSectorSigma = 4.5;     // beyond which a part's residuals are no noise
 constexpr double kShiftTolerance = 0.01;  // px that a part may be off: below what such contours are good for
 constexpr double kRobustSigma = 4;
+constexpr double kMostNoise = 0.05;  // of the step: what residuals may pass for noise, whatever the plane says
 
 /// Upper limit of χ²_n / n at so many standard deviations (Wilson & Hilferty 1931).
 double chi_square_limit(int n, double sigma) {
@@ -89,13 +90,20 @@ bool judge_sectors(std::vector<ContourFit::Sector>& sectors) {
   return changed;
 }
 
+enum class Effort : std::uint8_t {
+  plain,    ///< nothing is in the way, or little
+  careful,  ///< parts of the contour are taken to be disturbed
+  noisier,  ///< the same, and noise may be more than the plane says
+};
+
 /// Fits the pixels of one band. Where parts of the contour are disturbed the rest is fitted alone; false: there is no rest, or
 /// no answer.
-bool fit_band(ContourFit& pixels, ContourModel& model, double noise, bool careful, double converged, double ratio) {
+bool fit_band(ContourFit& pixels, ContourModel& model, double noise, Effort effort, double converged, double ratio) {
   pixels.expect(model, ratio);
   pixels.weigh();
   const auto tolerance = [&] { return kSectorTolerance * std::abs(model.p[ContourModel::step]); };
-  if (!careful) {
+  const auto most_noise = [&] { return kMostNoise * std::abs(model.p[ContourModel::step]) / noise; };
+  if (effort == Effort::plain) {
     const ContourModel start = model;
     if (pixels.solve(model, 20, converged, 0, ratio)) {
       pixels.measure_sectors(tolerance());
@@ -112,6 +120,7 @@ bool fit_band(ContourFit& pixels, ContourModel& model, double noise, bool carefu
     const double scale = std::max({kRobustSigma * std::clamp(pixels.robust_scale(), 1.0, 10.0), share * step});
     if (!pixels.solve(model, 10, 1e-3, scale, ratio)) return false;
   }
+  if (effort == Effort::noisier && pixels.raise_noise(most_noise())) pixels.weigh();
   for (int i = 0; i < 6; ++i) {
     pixels.measure_sectors(tolerance());
     if (!judge_sectors(pixels.sectors()) && i > 0) return true;
@@ -122,8 +131,8 @@ bool fit_band(ContourFit& pixels, ContourModel& model, double noise, bool carefu
   return true;
 }
 
-/// From a start to an answer. careful: parts of the contour are taken to be disturbed.
-EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const EllipseOptions& options, bool careful) {
+/// From a start to an answer.
+EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const EllipseOptions& options, Effort effort) {
   EllipseFit fit = start;
   fit.state = EllipseState::no_fit;
   const PixelBox picture{0, 0, plane.values.width(), plane.values.height()};
@@ -143,7 +152,7 @@ EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const Elli
     const BandWidth band = band_of(model.p[ContourModel::blur], ellipse.b, options.inner_ratio, round > 0, ring);
     pixels.gather(ellipse, band, sectors);
     if (pixels.gathered() < 2 * ContourModel::kSize) return fit;
-    if (!fit_band(pixels, model, start_noise, careful, round > 0 ? 1e-5 : 1e-2, ring ? options.inner_ratio : 0)) {
+    if (!fit_band(pixels, model, start_noise, effort, round > 0 ? 1e-5 : 1e-2, ring ? options.inner_ratio : 0)) {
       fit.visible = visible_share(pixels.sectors(), ellipse);
       if (fit.visible < options.min_visible) fit.state = EllipseState::occluded;
       return fit;
@@ -165,7 +174,7 @@ EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const Elli
   const int freedom = pixels.pixels() - (ring ? ContourModel::kSize : ContourModel::kSize - 1);
   if (freedom <= 0) return fit;
   const double variance_ratio = pixels.squares() / freedom;
-  fit.residual = std::sqrt(variance_ratio);
+  fit.residual = std::sqrt(variance_ratio) * pixels.noise_scale();
 
   // d Q / d root, Q = root².
   Eigen::Matrix<double, 5, ContourModel::kSize> j = Eigen::Matrix<double, 5, ContourModel::kSize>::Zero();
@@ -177,7 +186,8 @@ EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const Elli
   fit.covariance = j * inverse * j.transpose() * std::max(1.0, variance_ratio / 1.3);
   if (!fit.covariance.allFinite() || !(fit.covariance(0, 0) > 0) || !(fit.covariance(1, 1) > 0)) return fit;
 
-  const double noise = std::sqrt(std::max(1e-14, plane.noise.variance(0.5 * (fit.inside + fit.outside))));
+  const double noise =
+      pixels.noise_scale() * std::sqrt(std::max(1e-14, plane.noise.variance(0.5 * (fit.inside + fit.outside))));
   const double step = std::abs(model.p[ContourModel::step]), tolerated = kTolerance * step / noise;
   if (pixels.clipped() > options.max_saturated * pixels.gathered()) fit.state = EllipseState::saturated;
   else if (step < options.min_contrast_noise * noise) fit.state = EllipseState::no_contrast;
@@ -205,7 +215,7 @@ EllipseFit fit_ellipse(const LightPlane& plane, const Ellipse& guess, const Elli
   if (start.inside == start.outside) return start;  // nothing was looked at
   EllipseFit fit = start;
   if (started) {
-    fit = fit_from(plane, start, options, false);
+    fit = fit_from(plane, start, options, Effort::plain);
     if (fit.state == EllipseState::good && !near_guess(fit.ellipse, guess)) fit.state = EllipseState::no_fit;
     if (fit.state == EllipseState::good && fit.visible > 0.9) return fit;
     if (fit.state == EllipseState::saturated || fit.state == EllipseState::at_border) return fit;
@@ -213,10 +223,13 @@ EllipseFit fit_ellipse(const LightPlane& plane, const Ellipse& guess, const Elli
   // The dual conic is drawn off by whatever edge is near; the guess may not be.
   start.ellipse = guess;
   start.blur_px = std::min(start.blur_px, 1.0);
-  EllipseFit again = fit_from(plane, start, options, true);
+  EllipseFit again = fit_from(plane, start, options, Effort::careful);
   if (again.state == EllipseState::good && !near_guess(again.ellipse, guess)) again.state = EllipseState::no_fit;
   const bool better = again.state == EllipseState::good && (fit.state != EllipseState::good || again.visible > fit.visible);
-  return better || !started ? again : fit;
+  if (better || !started) fit = again;
+  if (fit.state == EllipseState::good || fit.state == EllipseState::no_contrast) return fit;
+  const EllipseFit noisier = fit_from(plane, start, options, Effort::noisier);
+  return noisier.state == EllipseState::good && near_guess(noisier.ellipse, guess) ? noisier : fit;
 }
 
 }  // namespace lumihull::calib

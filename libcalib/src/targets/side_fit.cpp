@@ -82,7 +82,7 @@ std::vector<Sample> samples_of(const LightPlane& plane, const SideCurve& side, c
   const int first = std::max(0, int(std::floor(middle - extent))),
             last = std::min(sizes[major] - 1, int(std::ceil(middle + extent)));
   std::vector<Sample> samples;
-  for (int i = first; i <= last; ++i) {
+  for (int i = first; i <= last; i += band.stride) {
     const double on = side.middle[minor] + (i + 0.5 - middle) * side.along[minor] / side.along[major];
     const double wide = reach / std::abs(normal[minor]) + 1;
     const int from = std::max(0, int(std::floor(on - wide))),

@@ -50,6 +50,7 @@ struct SideBand {
   double curvature_sd = 0;     ///< 1/px: what lenses and sheets make of a straight side (a Gaussian prior)
   double light_slope = 0;      ///< relative change of the light for each px outwards
   std::optional<SideExpectation> expected;
+  int stride = 1;  ///< only each so-manieth row or column of the band is looked at
 };
 
 struct SideFit {

@@ -13,6 +13,9 @@ namespace {
 // little of either, and leaves large ones their own.
 constexpr double kLevelTie = 0.02, kBlurTie = 0.05;
 
+// Lines across a side that the first measurement looks at: it serves to read the cells and to know the light.
+constexpr double kFirstLines = 48;
+
 /// Where two sides meet: Newton's iteration on their parameters, from the end of one and the beginning of the other.
 /// nullopt for sides that are nearly parallel, or meet far from there.
 struct Corner {
@@ -144,6 +147,7 @@ std::optional<SquareMeasurement> measure(const LightPlane& plane, const std::arr
     auto band = band_of(m.corners, k, chord, grid, pixel_from_grid);
     if (!band) return std::nullopt;
     band->curvature_sd = curvature_sd;
+    band->stride = first ? 1 : std::max(1, int(chord.length / kFirstLines));
     if (first) {
       const SquareLevels& l = first->levels;
       const double shade = l.shade(chord.middle);
@@ -201,6 +205,7 @@ std::optional<SquareMeasurement> measure_square_again(const LightPlane& plane, c
                                                       const std::vector<Cell>& cells, double curvature_sd) {
   constexpr int kRounds = 5;
   constexpr double kRest = 0.1;  // of a corner's standard deviation
+  constexpr double kWideBorder = 5;  // blurs
   std::optional<SquareMeasurement> now = first;
   for (int round = 0; round < kRounds; ++round) {
     const SquareMeasurement last = *now;
@@ -208,6 +213,10 @@ std::optional<SquareMeasurement> measure_square_again(const LightPlane& plane, c
     for (std::size_t k = 0; k < 4; ++k) start[k] = last.sides[k].curve;
     now = measure(plane, start, grid, cells, curvature_sd, &last);
     if (!now) return std::nullopt;
+    // Where the border is wide nothing leaks through it: there is nothing to repeat.
+    double shortest = 1e300;
+    for (const SideFit& side : now->sides) shortest = std::min(shortest, side.curve.length);
+    if (shortest / grid > kWideBorder * now->blur_px + 1) break;
     bool rests = true;
     for (std::size_t k = 0; k < 4; ++k) {
       const Eigen::Vector2d moved = now->corners[k] - last.corners[k];

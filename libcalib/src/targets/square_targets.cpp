@@ -19,8 +19,8 @@ namespace lumihull::calib {
 namespace {
 
 // A target is refused where its cells differ from what they should look like by more than this share of the contrast:
-// all together, and any of them.
-constexpr double kMostRms = 0.2, kMostOff = 0.5;
+// all together (more for each module that the blur is wide), and any of them. Real prints: 0.04, at most 0.06, and 0.19.
+constexpr double kMostRms = 0.09, kMostRmsBlurred = 0.1, kMostOff = 0.4;
 constexpr double kLeastSide = 8;             // px
 constexpr double kMostCornerDeviation = 0.5;  // px: a corner that is known no better than this is none
 
@@ -74,7 +74,8 @@ Answer measure_candidate(const LightPlane& plane, const TargetSet& set, const Ca
       read_square(plane, *pixel_from_grid, first->levels, first->blur_px, grid, cells);
   answer.reason = RefusedTarget::Reason::no_code;
   const double most_wrong = options.correct * correctable_cells(design.family);
-  if (reading.wrong > most_wrong || reading.rms > kMostRms || reading.worst > kMostOff) return answer;
+  const double most_rms = kMostRms + kMostRmsBlurred * std::min(1.0, first->blur_px / module);
+  if (reading.wrong > most_wrong || reading.rms > most_rms || reading.worst > kMostOff) return answer;
 
   const auto measured = options.refine ? measure_square_again(plane, *first, grid,
                                                               turned(cells, grid, reading.quarter_turns), bend)

@@ -21,31 +21,15 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Below this a simpler lens model is good enough: far under what calibration knows.
-constexpr double kGoodEnough_px = 0.01;
-
 /// The simplest of the models with `terms` radial coefficients that is good enough, or the best of them.
 internal::ForwardCamera expressed(const Capture& capture, int index, std::initializer_list<int> terms,
                                   const ExportOptions& options, ExportReport& report) {
-  using namespace internal;
-  const Camera& camera = capture.cameras.at(std::size_t(index));
   const std::string name = "camera " + std::to_string(index);
-  camera.validate();
-  ForwardRefit best;
-  best.largest_error_px = INFINITY;
-  for (const int n : terms) {
-    ForwardRefit refit = refit_forward(camera, n, name);
-    if (refit.largest_error_px < best.largest_error_px) best = refit;
-    if (best.largest_error_px <= kGoodEnough_px) break;
-  }
+  const internal::ForwardRefit best =
+      internal::simplest_refit(capture.cameras.at(std::size_t(index)), terms, options.max_refit_error_px, name);
+  report.largest_refit_error_px = std::max(report.largest_refit_error_px, best.largest_error_px);
   char text[100];
   std::snprintf(text, sizeof text, "%.3g px", best.largest_error_px);
-  if (!(best.largest_error_px <= options.max_refit_error_px)) {
-    const std::string lost = camera.skew != 0 ? "its skew of " + std::to_string(camera.skew) + " px" : "its lens";
-    throw Error(ErrorCode::unsupported, "the format can't express " + lost + ": pixels would move by up to " + text,
-                name);
-  }
-  report.largest_refit_error_px = std::max(report.largest_refit_error_px, best.largest_error_px);
   if (best.largest_error_px > 0) report.notes.push_back(name + ": refitted, largest error " + text);
   return best.camera;
 }

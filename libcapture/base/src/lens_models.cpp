@@ -334,4 +334,21 @@ ForwardRefit refit_forward(const Camera& camera, int terms, const std::string& n
   return refit;
 }
 
+ForwardRefit simplest_refit(const Camera& camera, std::initializer_list<int> terms, double limit_px,
+                            const std::string& name) {
+  constexpr double kGoodEnough_px = 0.01;
+  camera.validate();
+  ForwardRefit best;
+  best.largest_error_px = INFINITY;
+  for (const int n : terms) {
+    ForwardRefit refit = refit_forward(camera, n, name);
+    if (refit.largest_error_px < best.largest_error_px) best = refit;
+    if (best.largest_error_px <= kGoodEnough_px) break;
+  }
+  if (best.largest_error_px <= limit_px) return best;
+  const std::string lost = camera.skew != 0 ? "its skew of " + std::to_string(camera.skew) + " px" : "its lens";
+  throw Error(ErrorCode::unsupported,
+              "the format can't express " + lost + ": pixels would move by up to " + px(best.largest_error_px), name);
+}
+
 }  // namespace lumihull::internal

@@ -6,6 +6,7 @@
 #include <lumihull/base/camera.h>
 
 #include <Eigen/Core>
+#include <initializer_list>
 #include <optional>
 #include <string>
 
@@ -50,5 +51,10 @@ struct ForwardRefit {
 /// Their camera for ours: `terms` = how many radial coefficients may be used (0, 2, 3 or 6). The caller judges the
 /// error. Errors: unsupported where our lens model does not cover its picture.
 LUMIHULL_API ForwardRefit refit_forward(const Camera& camera, int terms, const std::string& name);
+
+/// With the first of these numbers of terms that is good to 0.01 px, far below what calibration knows, or else with the
+/// best of them. Errors: unsupported, also where that is off by more than `limit_px`.
+ForwardRefit simplest_refit(const Camera& camera, std::initializer_list<int> terms, double limit_px,
+                            const std::string& name);
 
 }  // namespace lumihull::internal

@@ -82,7 +82,15 @@ LUMIHULL_API LensCalibration calibrate_lens(std::span<const BoardView> views, in
 /// evenly over the picture, row-major.
 LUMIHULL_API std::vector<double> projection_uncertainty(const LensCalibration& calibration, int columns, int rows);
 
-/// A file ("lumihull-intrinsics", version 1): camera, covariance, what was measured. Errors: io.
+/// A self-contained page: parameters, residuals over the picture, by distance from its middle and by view, the uncertainty of
+/// projections. views: those that were calibrated from. Errors: invalid_argument (other views), bad_input (camera).
+LUMIHULL_API std::string lens_report_html(const LensCalibration& calibration, std::span<const BoardView> views,
+                                          const std::string& title);
+
+/// Text of a file ("lumihull-intrinsics", version 1): camera, covariance, what was measured. Errors: bad_input (a problem's
+/// text is not UTF-8).
+LUMIHULL_API std::string intrinsics_json(const LensCalibration& calibration);
+/// Writes such a file. Errors: io, bad_input.
 LUMIHULL_API void save_intrinsics(const std::filesystem::path& file, const LensCalibration& calibration);
 /// Camera and covariance from such a file; the rest is empty. Errors: not_found, io, bad_input.
 LUMIHULL_API LensCalibration load_intrinsics(const std::filesystem::path& file);

@@ -15,10 +15,10 @@ enum class SheetFormat : std::uint8_t { pdf, svg };
 
 struct LUMIHULL_API SheetOptions {
   Paper paper = Paper::letter;
-  int per_sheet = 1;          ///< 1 or 4 targets
-  bool paint_paper = false;   ///< fill the sheet with the design's paper colour, for white paper; else it is left bare
-  bool ids = true;            ///< each target's id, and what the sheet holds, small, in plain text
-  bool scale_bar = true;      ///< a bar of 150.0 mm, to be measured
+  int per_sheet = 1;         ///< 1 or 4 targets
+  bool paint_paper = false;  ///< fill the sheet with the design's paper colour, for white paper; else it is left bare
+  bool ids = true;           ///< each target's id, and what the sheet holds, small, in plain text
+  bool scale_bar = true;     ///< a bar of 150.0 mm, to be measured
 
   /// Throws Error{invalid_argument} naming the option.
   void validate() const;

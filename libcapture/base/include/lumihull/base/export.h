@@ -34,4 +34,17 @@ LUMIHULL_API ExportReport export_colmap(const Capture& capture, const std::files
 LUMIHULL_API ExportReport export_nerf(const Capture& capture, const std::filesystem::path& file,
                                       const ExportOptions& options = {});
 
+/// A camera in another program's words, and how far its lens model is from ours there.
+struct CameraText {
+  std::string text;
+  double largest_error_px = 0;  ///< over a grid of 65 x 49 pixels up to the picture's border; 0: exact
+};
+
+/// For cv::FileStorage (YAML): image_width, image_height, camera_matrix, and distortion_coefficients k1, k2, p1, p2, k3
+/// or, where these are off by more than 0.01 px, k1, k2, p1, p2, k3, k4, k5, k6. OpenCV counts pixels from the first
+/// one's centre: its principal point is ours less 0.5. Errors: as export_colmap.
+LUMIHULL_API CameraText opencv_camera(const Camera& camera, const ExportOptions& options = {});
+/// cameras.txt of COLMAP with this one camera of id 1: PINHOLE, OPENCV or FULL_OPENCV. Errors: as export_colmap.
+LUMIHULL_API CameraText colmap_camera(const Camera& camera, const ExportOptions& options = {});
+
 }  // namespace lumihull

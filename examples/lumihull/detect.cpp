@@ -1,0 +1,176 @@
+// lumihull detect PHOTO… --targets WORD|FILE: printed targets in photographs, with ids, places and covariances.
+
+#include <lumihull/base/error.h>
+#include <lumihull/base/parallel.h>
+#include <lumihull/calib/detect_targets.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <set>
+
+#include "program.h"
+
+namespace lumihull::program {
+
+namespace {
+
+namespace fs = std::filesystem;
+using calib::Detection;
+using calib::Detections;
+
+struct Arguments {
+  std::vector<std::string> photos;
+  std::string targets, ink_key, draw;
+  double magnify = 100;
+};
+
+struct Seen {
+  int width = 0, height = 0;
+  Detections found;
+  std::string drawing;
+};
+
+constexpr std::array<const char*, 5> kReasons{"no_code", "homography", "duplicate", "too_few_features", "unknown_id"};
+
+std::array<int, kReasons.size()> count_reasons(const Detections& found) {
+  std::array<int, kReasons.size()> counts{};
+  for (const auto& r : found.refused)
+    if (std::size_t(r.reason) < counts.size()) ++counts[std::size_t(r.reason)];
+  return counts;
+}
+
+std::string number(double v) {
+  if (!std::isfinite(v)) return "null";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.10g", v);
+  return text;
+}
+
+std::string json_of(const calib::TargetSet& set, const Detection& d) {
+  std::string text;
+  if (d.id < 0)
+    text = "{\"grid\": " + std::to_string(d.design);
+  else
+    text = "{\"design\": " + std::to_string(d.design) +
+           ", \"family\": " + json_text(set.designs[std::size_t(d.design)].family.name()) +
+           ", \"id\": " + std::to_string(d.id);
+  text += ", \"corrected\": " + std::to_string(d.corrected) + ", \"erased\": " + std::to_string(d.erased) +
+          ", \"rms_px\": " + number(d.rms_px) + ", \"features\": [";
+  for (std::size_t i = 0; i < d.features.size(); ++i) {
+    const calib::Feature& f = d.features[i];
+    text += std::string(i ? ", " : "") + "{\"index\": " + std::to_string(f.index) + ", \"pixel\": [" +
+            number(f.pixel.x()) + ", " + number(f.pixel.y()) + "], \"covariance\": [" + number(f.covariance(0, 0)) + ", " +
+            number(f.covariance(0, 1)) + ", " + number(f.covariance(1, 1)) + "]}";
+  }
+  return text + "]}";
+}
+
+std::string json_of(const calib::TargetSet& set, const std::string& photo, const Seen& seen) {
+  std::string text = "{\"photo\": " + json_text(photo) + ", \"width\": " + std::to_string(seen.width) +
+                     ", \"height\": " + std::to_string(seen.height) + ", \"targets\": [";
+  for (std::size_t i = 0; i < seen.found.targets.size(); ++i)
+    text += (i ? ", " : "") + json_of(set, seen.found.targets[i]);
+  text += "], \"refused\": {";
+  const auto counts = count_reasons(seen.found);
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    text += std::string(i ? ", \"" : "\"") + kReasons[i] + "\": " + std::to_string(counts[i]);
+  text += "}";
+  if (!seen.drawing.empty()) text += ", \"drawing\": " + json_text(seen.drawing);
+  return text + "}";
+}
+
+/// NAME.png for each photograph; a number behind where names come twice.
+std::vector<std::string> drawing_names(const Arguments& a) {
+  std::vector<std::string> names;
+  std::set<std::string> taken;
+  for (const std::string& photo : a.photos) {
+    const std::string stem = fs::path(photo).stem().string();
+    std::string name = stem + ".png";
+    for (int i = 2; !taken.insert(name).second; ++i) name = stem + "-" + std::to_string(i) + ".png";
+    names.push_back((fs::path(a.draw) / name).string());
+    if (fs::exists(names.back()) && fs::equivalent(names.back(), photo))
+      throw Error(ErrorCode::invalid_argument, "the drawing would replace the photograph; name another folder", photo);
+  }
+  return names;
+}
+
+void detect(Program& program, const Arguments& a) {
+  Job& job = program.job();
+  calib::DetectOptions options;
+  if (!a.ink_key.empty()) options.ink_key = calib::ColorKey::load(a.ink_key, job);
+  const calib::TargetDetector detector(calib::TargetSet::from_text(a.targets), options);
+  std::vector<std::string> drawings;
+  if (!a.draw.empty()) {
+    fs::create_directories(a.draw);
+    drawings = drawing_names(a);
+  }
+
+  std::vector<Seen> seen(a.photos.size());
+  const auto look = [&](std::size_t i, Job& inner) {
+    const Image photo = read_image(a.photos[i]);
+    seen[i].width = photo.width(), seen[i].height = photo.height();
+    seen[i].found = detector.detect(photo, inner);
+    if (drawings.empty()) return;
+    write_png(drawings[i], draw_detections(photo, detector.set(), seen[i].found, a.magnify));
+    seen[i].drawing = drawings[i];
+  };
+  // Many photographs: a thread each. Few: all threads work on one of them.
+  job.begin("detecting targets", a.photos.size());
+  if (a.photos.size() >= job.threads()) {
+    parallel_for(
+        job, a.photos.size(),
+        [&](std::size_t i) {
+          Job inner({}, 1);
+          look(i, inner);
+        },
+        true);
+  } else {
+    for (std::size_t i = 0; i < a.photos.size(); ++i) {
+      job.check();
+      look(i, job);
+      job.advance();
+    }
+  }
+  job.end();
+
+  std::size_t targets = 0, features = 0;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const Detections& found = seen[i].found;
+    targets += found.targets.size();
+    for (const Detection& d : found.targets) features += d.features.size();
+    std::string line = a.photos[i] + ": " + std::to_string(found.targets.size()) + " targets";
+    const auto counts = count_reasons(found);
+    for (std::size_t k = 0; k < counts.size(); ++k)
+      if (counts[k] > 0) line += "; refused as " + std::string(kReasons[k]) + ": " + std::to_string(counts[k]);
+    program.say(line);
+  }
+  program.say(std::to_string(targets) + " targets, " + std::to_string(features) + " points in " +
+              std::to_string(seen.size()) + " photographs");
+  if (!program.json) return;
+  std::cout << "{\"targets\": " << targets << ", \"features\": " << features << ", \"photos\": [";
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    std::cout << (i ? ",\n" : "\n") << json_of(detector.set(), a.photos[i], seen[i]);
+  std::cout << "]}\n";
+}
+
+}  // namespace
+
+void add_detect(Program& program) {
+  const auto a = std::make_shared<Arguments>();
+  CLI::App* verb = program.verb("detect", "find printed targets in photographs and measure them",
+                                [&program, a] { detect(program, *a); });
+  verb->add_option("photos", a->photos, "photographs")->required();
+  verb->add_option("--targets", a->targets,
+                   "what was printed: a file that describes it, or words as matrix5x5:18mm, apriltag:36h11:50mm, "
+                   "aruco:6x6_250:35mm, joined by commas")
+      ->required();
+  verb->add_option("--ink-key", a->ink_key, "a trained colour key: target ink against everything else");
+  verb->add_option("--draw", a->draw, "folder for the photographs with what was found drawn in");
+  verb->add_option("--magnify", a->magnify, "how much larger residuals are drawn")->check(CLI::Range(0.0, 1e6));
+}
+
+}  // namespace lumihull::program

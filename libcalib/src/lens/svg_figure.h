@@ -1,0 +1,46 @@
+#pragma once
+
+// Pictures as SVG text inside HTML: lines, dots, axes. Colours by class, so that they suit light and dark surroundings.
+
+#include <Eigen/Core>
+#include <string>
+#include <string_view>
+
+namespace lumihull::calib::lens {
+
+/// Text for HTML's content: & < > " escaped, control characters replaced.
+std::string html_text(std::string_view text);
+/// printf's format for one number; a dash where it is not finite.
+std::string number(const char* format, double value);
+
+/// 1, 2 or 5 times a power of ten, for about `count` steps over a range.
+double tick_step(double range, int count);
+
+/// Data within [x0, x1] x [y0, y1] in a frame with ticks and labels. y downwards where y1 < y0.
+class SvgFigure {
+ public:
+  SvgFigure(std::string title, double width, double height);
+
+  /// Draws frame, ticks and labels, and sets the scale of what follows.
+  void axes(double x0, double x1, double y0, double y1, const std::string& x_label, const std::string& y_label);
+  void line(double x0, double y0, double x1, double y1, std::string_view style);
+  void dot(double x, double y, double radius_px, std::string_view style);
+  /// Corners in data; `style` a class, or a colour where it begins with '#'.
+  void box(double x0, double y0, double x1, double y1, std::string_view style);
+  void text(double x, double y, const std::string& words, std::string_view style = "small", const char* anchor = "middle");
+  /// Below the title.
+  void note(const std::string& words);
+
+  std::string str() const;
+  /// What all figures' classes look like: for the page's <style>.
+  static std::string style_sheet();
+
+ private:
+  double x_of(double x) const;
+  double y_of(double y) const;
+
+  double width_, height_, x0_ = 0, x1_ = 1, y0_ = 0, y1_ = 1;
+  std::string title_, body_, note_;
+};
+
+}  // namespace lumihull::calib::lens
