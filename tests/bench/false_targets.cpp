@@ -25,7 +25,7 @@
 #include <string>
 #include <vector>
 
-#include "../calib/targets/clutter.h"
+#include "../calib/targets/pictures_without_targets.h"
 #include "../calib/targets/target_shot.h"
 
 using namespace lumihull;

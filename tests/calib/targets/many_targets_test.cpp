@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "clutter.h"
+#include "pictures_without_targets.h"
 #include "support.h"
 #include "target_shot.h"
 

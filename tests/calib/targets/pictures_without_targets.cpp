@@ -1,4 +1,4 @@
-#include "clutter.h"
+#include "pictures_without_targets.h"
 
 #include <cairo.h>
 #include <lumihull/rig/flat_print.h>
