@@ -24,21 +24,26 @@ std::optional<double> sample(const Image& values, const Vector2d& p) {
   return (1 - fy) * ((1 - fx) * a[x0] + fx * a[x1]) + fy * ((1 - fx) * b[x0] + fx * b[x1]);
 }
 
-// Mean of the places at `radius` (a part of the semi-axes) and the centre.
+// Mean of a circle's inner part: its centre and twelve places up to `radius` (a part of the semi-axes).
 std::optional<double> mean_within(const Image& values, const Ellipse& e, double radius) {
-  double sum = 0;
-  int n = 0;
-  for (int ring = 0; ring < 3; ++ring) {
-    const int places = ring == 0 ? 1 : 6 * ring;
-    for (int k = 0; k < places; ++k) {
-      const double t = 2 * std::numbers::pi * k / places;
-      const auto v = sample(values, e.center + 0.5 * ring * radius * (e.point(t) - e.center));
-      if (!v) return std::nullopt;
-      sum += *v;
-      ++n;
+  static const std::array<Vector2d, 13> places = [] {
+    std::array<Vector2d, 13> p;
+    for (int k = 0; k < 12; ++k) {  // six halfway out, six at the rim
+      const double t = std::numbers::pi * k / 6;
+      p[std::size_t(k)] = (k % 2 ? 1.0 : 0.5) * Vector2d(std::cos(t), std::sin(t));
     }
+    p[12] = {0, 0};
+    return p;
+  }();
+  const Vector2d u = radius * e.a * Vector2d(std::cos(e.angle), std::sin(e.angle));
+  const Vector2d v = radius * e.b * Vector2d(-std::sin(e.angle), std::cos(e.angle));
+  double sum = 0;
+  for (const Vector2d& p : places) {
+    const auto value = sample(values, e.center + p.x() * u + p.y() * v);
+    if (!value) return std::nullopt;
+    sum += *value;
   }
-  return sum / n;
+  return sum / double(places.size());
 }
 
 // Part of a normal distribution with standard deviations sx, sy along the axes that is inside of the unit circle.
@@ -61,30 +66,32 @@ double median(std::vector<double>& v) {
 
 // Sigma of the picture's blur, pixels' extent included, by the steepest place across contours: contrast / (σ √2π).
 double blur_of(const Image& values, std::span<const Ellipse> circles, std::span<const EllipseState> states,
-               std::span<const double> paper, std::span<const double> dark) {
-  constexpr int kDirections = 12;
+               std::span<const double> paper, double dark) {
+  constexpr int kDirections = 8, kMostCircles = 25, kMostPlaces = 15;
   constexpr double kStep = 0.5;
   std::vector<double> sigmas;
-  for (std::size_t i = 0; i < circles.size(); ++i) {
-    if (states[i] != EllipseState::good) continue;
-    const double contrast = paper[i] * dark[i];
-    if (!(contrast > 0)) continue;
+  const std::size_t stride = (circles.size() + kMostCircles - 1) / kMostCircles;
+  for (std::size_t i = 0; i < circles.size(); i += stride) {
+    const double contrast = paper[i] * dark;
+    if (states[i] != EllipseState::good || !(contrast > 0)) continue;
+    const Ellipse& e = circles[i];
+    const double ca = std::cos(e.angle), sa = std::sin(e.angle);
     double sum = 0;
     int n = 0;
     for (int k = 0; k < kDirections; ++k) {
-      const Vector2d edge = circles[i].point(2 * std::numbers::pi * k / kDirections);
-      const Vector2d radius = edge - circles[i].center;
-      // Across the contour, not along the radius: their angle shortens steps.
-      const double length = radius.norm();
-      const double t = 2 * std::numbers::pi * k / kDirections;
-      const Vector2d tangent = circles[i].point(t + 0.01) - circles[i].point(t - 0.01);
-      Vector2d normal = Vector2d(tangent.y(), -tangent.x()).normalized();
-      if (normal.dot(radius) < 0) normal = -normal;
-      double steepest = 0;
-      const double reach = std::min(0.35 * length, 3.0);
-      for (double s = -reach; s <= reach; s += kStep) {
-        const auto in = sample(values, edge + (s - kStep) * normal), out = sample(values, edge + (s + kStep) * normal);
-        if (in && out) steepest = std::max(steepest, (*out - *in) / (2 * kStep));
+      const double t = 2 * std::numbers::pi * k / kDirections, c = std::cos(t), s = std::sin(t);
+      const Vector2d edge = e.center + Vector2d(e.a * c * ca - e.b * s * sa, e.a * c * sa + e.b * s * ca);
+      // Across the contour: (cos t / a, sin t / b) in the ellipse's frame.
+      const double nx = c / e.a, ny = s / e.b, length = std::hypot(nx, ny);
+      const Vector2d normal(nx / length * ca - ny / length * sa, nx / length * sa + ny / length * ca);
+      const int reach = std::min(kMostPlaces / 2, int(0.35 * std::hypot(e.a * c, e.b * s) / kStep) + 1);
+      double before[2] = {0, 0}, steepest = 0;  // two steps back, one step back
+      int seen = 0;
+      for (int p = -reach; p <= reach; ++p) {
+        const auto v = sample(values, edge + p * kStep * normal);
+        if (!v) break;
+        if (seen >= 2) steepest = std::max(steepest, (*v - before[0]) / (2 * kStep));
+        before[0] = before[1], before[1] = *v, ++seen;
       }
       if (steepest > 0) sum += steepest, ++n;
     }
@@ -139,16 +146,15 @@ CellReading read_cells(const LightPlane& plane, std::span<const Ellipse> circles
   reading.contrast = reference;
   if (!(reference > 0.05)) return reading;
 
-  std::vector<double> dark(n, reference);
-  const double sigma = blur_of(values, circles, states, paper, dark);
+  const double sigma = blur_of(values, circles, states, paper, reference);
   reading.blur_px = sigma;
   for (std::size_t i = 0; i < n; ++i) {
     if (!seen[i] || states[i] != EllipseState::good) continue;
     const double x = darkness[i] / reference;
     double light = 0;  // what x is of a light circle
     if (!look.solid_light) {
-      // Averaging over a disc is a blur, too: its variance is a quarter of its radius squared.
-      const double a = circles[i].a, b = circles[i].b, averaged = 0.25 * within * within;
+      // Averaging is a blur, too: the places' variance along an axis is about a third of the radius squared.
+      const double a = circles[i].a, b = circles[i].b, averaged = 0.29 * within * within;
       const double sx = std::sqrt(sigma * sigma / (a * a) + averaged), sy = std::sqrt(sigma * sigma / (b * b) + averaged);
       const double disc = inside_unit_circle(sx, sy);
       const double hole = inside_unit_circle(sx / look.ring_ratio, sy / look.ring_ratio);
