@@ -3,13 +3,15 @@
 //
 //     bench_detection [OUT_FOLDER] [--renders 2000] [--families matrix5x5,…] [--seed 1] [--threads 0] [--only INDEX]
 //
-// Each family gets its share of the renders. A render: one target on its sheet under random turn, tilt (0 … 75°), circles'
-// minor axis (3.5 … 40 px, mostly small; a tag's as if it were a 5 x 5 target of its outer size), blur (half of them .3 …
-// 1, half 0 … 3 px), exposure, shading, noise of .3 … 2 % of white, background; a quarter each in the corner of a 10 mm
-// lens's picture, through a Bayer mosaic, through a JPEG, one in twenty partly hidden. `found`: the id was read and each
-// feature is where it belongs; a detection that is not is wrong. --only writes that render of each family as a picture and
-// says what was refused, and why.
+// Each family gets its share of the renders. A render: one target on its sheet under random turn, tilt (0 … 75°),
+// circles' minor axis (3.5 … 40 px, mostly small; a tag's as if it were a 5 x 5 target of its outer size), blur (half
+// of them .3 … 1, half 0 … 3 px), exposure, shading, noise of .3 … 2 % of white, background; a quarter each in the
+// corner of a 10 mm lens's picture, through a Bayer mosaic, through a JPEG, one in twenty partly hidden. `found`: the
+// id was read and each feature is where it belongs; a detection that is not is wrong. --only writes that render of each
+// family as a picture and says what was refused, and why.
 
+#include <apriltag/apriltag.h>
+#include <apriltag/tag36h11.h>
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
 #include <lumihull/base/job.h>
@@ -18,8 +20,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <apriltag/apriltag.h>
-#include <apriltag/tag36h11.h>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -28,9 +28,9 @@
 #include <functional>
 #include <memory>
 #include <numbers>
-#include <optional>
 #include <opencv2/aruco.hpp>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -211,18 +211,17 @@ void show(const Family& family, std::size_t i, const fs::path& out) {
   write_png(out / (stem + ".png"), shot.photo);
   Job job({}, 1);
   const calib::Detections found = family.detector.detect(shot.photo, job);
-  write_png(out / (stem + "_drawn.png"),
-            calib::draw_detections(shot.photo, Family::set_of(family.design), found));
-  std::printf("%s %zu: id %d, minor axis %.2f px, tilt %.1f°, blur %.2f px, noise %.4f%s%s%s%s\n", family.name.c_str(), i,
-              shot.id, seen.minor_px, seen.tilt_rad / kDegree, seen.blur_px, seen.noise, seen.wide ? ", 10 mm" : "",
+  write_png(out / (stem + "_drawn.png"), calib::draw_detections(shot.photo, Family::set_of(family.design), found));
+  std::printf("%s %zu: id %d, minor axis %.2f px, tilt %.1f°, blur %.2f px, noise %.4f%s%s%s%s\n", family.name.c_str(),
+              i, shot.id, seen.minor_px, seen.tilt_rad / kDegree, seen.blur_px, seen.noise, seen.wide ? ", 10 mm" : "",
               seen.bayer ? ", Bayer" : "", seen.jpeg ? ", JPEG" : "", seen.occluded ? ", hidden" : "");
   for (const calib::Detection& t : found.targets)
     std::printf("  id %d, %zu features, corrected %d, erased %d, rms %.3f px\n", t.id, t.features.size(), t.corrected,
                 t.erased, t.rms_px);
   const char* reasons[] = {"no code", "homography", "duplicate", "too few features", "unknown id"};
   for (const calib::RefusedTarget& t : found.refused)
-    std::printf("  refused: %s at (%.1f, %.1f), %.1f px, id %d\n", reasons[std::size_t(t.reason)], t.pixel.x(), t.pixel.y(),
-                t.size_px, t.id);
+    std::printf("  refused: %s at (%.1f, %.1f), %.1f px, id %d\n", reasons[std::size_t(t.reason)], t.pixel.x(),
+                t.pixel.y(), t.size_px, t.id);
 }
 
 std::vector<Render> study(const Family& family, std::size_t count, Job& job) {
@@ -245,9 +244,10 @@ std::vector<Render> study(const Family& family, std::size_t count, Job& job) {
           render.ours = {verdict.found, verdict.wrong};
           if (verdict.wrong)
             for (const calib::Detection& t : found.targets)
-              std::fprintf(stderr, "wrong: %s --seed %llu --only %zu: id %d for %d, corrected %d, erased %d, rms %.3f px\n",
-                           family.name.c_str(), static_cast<unsigned long long>(family.seed), i, t.id, shot.id, t.corrected,
-                           t.erased, t.rms_px);
+              std::fprintf(stderr,
+                           "wrong: %s --seed %llu --only %zu: id %d for %d, corrected %d, erased %d, rms %.3f px\n",
+                           family.name.c_str(), static_cast<unsigned long long>(family.seed), i, t.id, shot.id,
+                           t.corrected, t.erased, t.rms_px);
           if (!april && family.name != "aruco:6x6_250") continue;
           const Image grey = converted(shot.photo, PixelType::u8, 1);
           start = cpu_ms();
@@ -271,25 +271,23 @@ void print_table(const std::string& title, const std::vector<Row>& rows, const s
   for (const Row& row : rows) {
     std::printf("%-28s", row.label.c_str());
     for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
-      const Rate r = rate(*row.renders, row.peer, [&](const Render& x) {
-        return among(x) && value(x) >= edges[i] && value(x) < edges[i + 1];
-      });
+      const Rate r = rate(*row.renders, row.peer,
+                          [&](const Render& x) { return among(x) && value(x) >= edges[i] && value(x) < edges[i + 1]; });
       r.renders ? std::printf(" %11.2f", r.percent()) : std::printf(" %11s", "-");
     }
     std::printf("\n");
   }
 }
 
-void write_plot(const fs::path& file, const std::string& title, const std::string& x_label, const std::vector<Row>& rows,
-                const std::vector<double>& edges, const std::function<double(const Render&)>& value,
-                const std::function<bool(const Render&)>& among) {
+void write_plot(const fs::path& file, const std::string& title, const std::string& x_label,
+                const std::vector<Row>& rows, const std::vector<double>& edges,
+                const std::function<double(const Render&)>& value, const std::function<bool(const Render&)>& among) {
   bench::Plot plot{title, x_label, "found, %", {}, {}};
   for (const Row& row : rows) {
     bench::Curve curve{row.label, {}};
     for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
-      const Rate r = rate(*row.renders, row.peer, [&](const Render& x) {
-        return among(x) && value(x) >= edges[i] && value(x) < edges[i + 1];
-      });
+      const Rate r = rate(*row.renders, row.peer,
+                          [&](const Render& x) { return among(x) && value(x) >= edges[i] && value(x) < edges[i + 1]; });
       if (r.renders) curve.points.push_back({.5 * (edges[i] + edges[i + 1]), r.percent(), ""});
     }
     if (!curve.points.empty()) plot.curves.push_back(curve);
@@ -298,8 +296,11 @@ void write_plot(const fs::path& file, const std::string& title, const std::strin
 }
 
 void run(const Settings& s) {
-  Job job([](const Progress& p) { std::fprintf(stderr, "\r  %-24s %3.0f %%\r", p.stage.c_str(), 100. * double(p.done) / double(p.total)); },
-          s.threads);
+  Job job(
+      [](const Progress& p) {
+        std::fprintf(stderr, "\r  %-24s %3.0f %%\r", p.stage.c_str(), 100. * double(p.done) / double(p.total));
+      },
+      s.threads);
   cv::setNumThreads(1);
   std::vector<std::vector<Render>> all;
   all.reserve(s.families.size());
@@ -313,7 +314,8 @@ void run(const Settings& s) {
   if (s.only) return;
 
   std::vector<Row> rows;
-  std::string csv = "family,detector,minor_px,tilt_deg,blur_px,noise,wide,bayer,jpeg,occluded,width,height,found,wrong,ms\n";
+  std::string csv =
+      "family,detector,minor_px,tilt_deg,blur_px,noise,wide,bayer,jpeg,occluded,width,height,found,wrong,ms\n";
   for (std::size_t k = 0; k < s.families.size(); ++k) {
     const std::string& name = s.families[k];
     const std::string peer = name == "apriltag:36h11" ? "libapriltag" : name == "aruco:6x6_250" ? "OpenCV" : "";
@@ -349,18 +351,16 @@ void run(const Settings& s) {
   }
   const auto minor = [](const Render& r) { return r.seen.minor_px; };
   const auto blur = [](const Render& r) { return r.seen.blur_px; };
-  const std::vector<double> sizes{3.5, 4, 4.5, 5, 5.5, 6, 7, 8, 10, 12, 20, 40}, tilts{0, 15, 30, 40, 50, 60, 65, 70, 75},
-      blurs{0, .25, .5, .75, 1, 1.25, 1.5, 1.75, 2, 2.5, 3};
+  const std::vector<double> sizes{3.5, 4, 4.5, 5, 5.5, 6, 7, 8, 10, 12, 20, 40},
+      tilts{0, 15, 30, 40, 50, 60, 65, 70, 75}, blurs{0, .25, .5, .75, 1, 1.25, 1.5, 1.75, 2, 2.5, 3};
   print_table("found, %, by the circles' minor axis, px (tilt <= 60°, blur <= 1 px)", rows, sizes, minor,
               [](const Render& r) { return degrees(r) <= 60 && sharp(r); });
   print_table("found, %, by tilt, degrees (minor axis 5 ... 12 px, blur <= 1 px)", rows, tilts, degrees,
               [](const Render& r) { return r.seen.minor_px >= 5 && r.seen.minor_px < 12 && sharp(r); });
-  print_table("found, %, by blur, px (minor axis 5 ... 8 px, tilt <= 60°)", rows, blurs, blur, [](const Render& r) {
-    return degrees(r) <= 60 && r.seen.minor_px >= 5 && r.seen.minor_px < 8;
-  });
-  print_table("found, %, by blur, px (minor axis 8 ... 12 px, tilt <= 60°)", rows, blurs, blur, [](const Render& r) {
-    return degrees(r) <= 60 && r.seen.minor_px >= 8 && r.seen.minor_px < 12;
-  });
+  print_table("found, %, by blur, px (minor axis 5 ... 8 px, tilt <= 60°)", rows, blurs, blur,
+              [](const Render& r) { return degrees(r) <= 60 && r.seen.minor_px >= 5 && r.seen.minor_px < 8; });
+  print_table("found, %, by blur, px (minor axis 8 ... 12 px, tilt <= 60°)", rows, blurs, blur,
+              [](const Render& r) { return degrees(r) <= 60 && r.seen.minor_px >= 8 && r.seen.minor_px < 12; });
   const auto split = [&](const char* title, const std::function<bool(const Render&)>& which) {
     std::printf("\n%s, found, %% (>= 5 px, <= 60°, blur <= 1 px)\n", title);
     for (const Row& row : rows) {
@@ -377,16 +377,15 @@ void run(const Settings& s) {
   split("Bayer mosaic", [](const Render& r) { return r.seen.bayer; });
   split("JPEG", [](const Render& r) { return r.seen.jpeg; });
 
-  write_plot(s.out / "detection_size.svg", "Found, by size (tilt to 60°, blur to 1 px)", "minor axis of a circle, px", rows,
-             {3.5, 4, 4.5, 5, 5.5, 6, 6.5, 7, 8, 9, 10, 12}, minor,
+  write_plot(s.out / "detection_size.svg", "Found, by size (tilt to 60°, blur to 1 px)", "minor axis of a circle, px",
+             rows, {3.5, 4, 4.5, 5, 5.5, 6, 6.5, 7, 8, 9, 10, 12}, minor,
              [](const Render& r) { return degrees(r) <= 60 && sharp(r); });
-  write_plot(s.out / "detection_tilt.svg", "Found, by tilt (minor axis 5 to 12 px, blur to 1 px)", "tilt, degrees", rows,
-             tilts, degrees,
+  write_plot(s.out / "detection_tilt.svg", "Found, by tilt (minor axis 5 to 12 px, blur to 1 px)", "tilt, degrees",
+             rows, tilts, degrees,
              [](const Render& r) { return r.seen.minor_px >= 5 && r.seen.minor_px < 12 && sharp(r); });
-  write_plot(s.out / "detection_blur.svg", "Found, by blur (minor axis 8 to 12 px, tilt to 60°)",
-             "blur (sigma), px", rows, blurs, blur, [](const Render& r) {
-               return degrees(r) <= 60 && r.seen.minor_px >= 8 && r.seen.minor_px < 12;
-             });
+  write_plot(s.out / "detection_blur.svg", "Found, by blur (minor axis 8 to 12 px, tilt to 60°)", "blur (sigma), px",
+             rows, blurs, blur,
+             [](const Render& r) { return degrees(r) <= 60 && r.seen.minor_px >= 8 && r.seen.minor_px < 12; });
 }
 
 }  // namespace

@@ -3,9 +3,11 @@
 //
 //     bench_false_targets [OUT_FOLDER] [--pictures 10000] [--size 320] [--data FOLDER] [--seed 1] [--threads 0]
 //
-// Crops are taken from photographs in FOLDER's dinosaur, temple, chessboards and case ($LUMIHULL_TEST_DATA; without, that
-// kind is left out). `case` shows ArUco markers of 6x6_250: families of ArUco do not look at its crops.
+// Crops are taken from photographs in FOLDER's dinosaur, temple, chessboards and case ($LUMIHULL_TEST_DATA; without,
+// that kind is left out). `case` shows ArUco markers of 6x6_250: families of ArUco do not look at its crops.
 
+#include <apriltag/apriltag.h>
+#include <apriltag/tag36h11.h>
 #include <lumihull/base/files.h>
 #include <lumihull/base/image.h>
 #include <lumihull/base/job.h>
@@ -13,8 +15,6 @@
 #include <lumihull/calib/detect_targets.h>
 
 #include <CLI/CLI.hpp>
-#include <apriltag/apriltag.h>
-#include <apriltag/tag36h11.h>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -25,7 +25,7 @@
 #include <string>
 #include <vector>
 
-#include "../calib/targets/clutter.h"
+#include "../calib/targets/pictures_without_targets.h"
 #include "../calib/targets/target_shot.h"
 
 using namespace lumihull;
@@ -79,8 +79,11 @@ std::size_t opencv(const Image& grey) {
 }
 
 void run(const Settings& s) {
-  Job job([](const Progress& p) { std::fprintf(stderr, "\r  %-24s %3.0f %%\r", p.stage.c_str(), 100. * double(p.done) / double(p.total)); },
-          s.threads);
+  Job job(
+      [](const Progress& p) {
+        std::fprintf(stderr, "\r  %-24s %3.0f %%\r", p.stage.c_str(), 100. * double(p.done) / double(p.total));
+      },
+      s.threads);
   cv::setNumThreads(1);
   // Whatever holds no ArUco markers first: its crops are for all families.
   const std::vector<Image> plain = photographs(s.data, {"dinosaur", "temple", "chessboards"}),
@@ -115,11 +118,12 @@ void run(const Settings& s) {
               ++found[i][k];
               const std::lock_guard lock(mutex);
               char line[200];
-              std::snprintf(line, sizeof line, "%s,%zu,%s,%d,%d,%d,%.3f,%.1f,%.1f\n", test::clutter_name(kind).c_str(), i,
-                            s.families[k].c_str(), t.id, t.corrected, t.erased, t.rms_px, t.features[0].pixel.x(),
+              std::snprintf(line, sizeof line, "%s,%zu,%s,%d,%d,%d,%.3f,%.1f,%.1f\n", test::clutter_name(kind).c_str(),
+                            i, s.families[k].c_str(), t.id, t.corrected, t.erased, t.rms_px, t.features[0].pixel.x(),
                             t.features[0].pixel.y());
               csv += line;
-              std::fprintf(stderr, "false: seed %llu size %d %s", static_cast<unsigned long long>(s.seed), s.size, line);
+              std::fprintf(stderr, "false: seed %llu size %d %s", static_cast<unsigned long long>(s.seed), s.size,
+                           line);
             }
           }
           const Image grey = converted(picture, PixelType::u8, 1);

@@ -114,10 +114,11 @@ void run(const fs::path& folder, std::size_t photos, const std::string& family, 
   rusage usage;
   getrusage(RUSAGE_SELF, &usage);
   const double n = double(photos);
-  std::printf("%zu photographs, %u threads: %.1f s; CPU a photograph: %.0f ms decoding, %.0f ms detecting; %d of %zu targets, "
-              "%d wrong; peak memory %.0f MB\n",
-              photos, job.threads(), took, 1e3 * sum_decode / n, 1e3 * sum_detect / n, sum_found,
-              photos * kColumns * kRows, sum_wrong, double(usage.ru_maxrss) / 1024);
+  std::printf(
+      "%zu photographs, %u threads: %.1f s; CPU a photograph: %.0f ms decoding, %.0f ms detecting; %d of %zu targets, "
+      "%d wrong; peak memory %.0f MB\n",
+      photos, job.threads(), took, 1e3 * sum_decode / n, 1e3 * sum_detect / n, sum_found, photos * kColumns * kRows,
+      sum_wrong, double(usage.ru_maxrss) / 1024);
 }
 
 }  // namespace

@@ -108,13 +108,13 @@ TEST(FlatPrint, TiltedDiscIsTheEllipseOfTheDualConic) {
 }
 
 TEST(FlatPrint, LensBendsWhatIsSeen) {
-  // Against sampling pixel by pixel: 40 x 40 rays each.
+  // Against sampling pixel by pixel: 24 x 24 rays each.
   View v = view(60, 60);
   v.camera.k1 = -.2, v.camera.k2 = .05, v.camera.p1 = .01, v.camera.p2 = -.005;
   const FlatPrint print = sheet(.25, .8, .6);
   const Image seen = photograph(v, {print});
   const Pose print_from_cam = print.world_from_print.inverse() * v.cam_from_world.inverse();
-  const int n = 40;
+  const int n = 24;
   double worst = 0, sum = 0;
   for (int y = 0; y < 60; ++y)
     for (int x = 0; x < 60; ++x) {
@@ -130,7 +130,7 @@ TEST(FlatPrint, LensBendsWhatIsSeen) {
       const double error = seen.row<float>(y)[3 * x] - truth;
       worst = std::max(worst, std::abs(error)), sum += error;
     }
-  EXPECT_LT(worst, .02);  // the sampling's own error
+  EXPECT_LT(worst, .03);  // the sampling's own error
   EXPECT_LT(std::abs(sum / 3600), 1e-5);
 }
 

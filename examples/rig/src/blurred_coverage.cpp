@@ -6,9 +6,10 @@
 
 #include "flat_coverage.h"
 
-// Pixels are samples of edges, which hold detail at all frequencies; a Gaussian applied to them would blur what has been
-// aliased already, and move circles of 6 px by up to .008 px. So the first .8 px of blur are applied to parts of pixels,
-// and only then the picture is sampled; what is left of the blur acts on pixels that hold nothing beyond their frequency.
+// Pixels are samples of edges, which hold detail at all frequencies; a Gaussian applied to them would blur what has
+// been aliased already, and move circles of 6 px by up to .008 px. So the first .8 px of blur are applied to parts of
+// pixels, and only then the picture is sampled; what is left of the blur acts on pixels that hold nothing beyond their
+// frequency.
 
 namespace lumihull::rig {
 
@@ -115,7 +116,8 @@ void blur(Image& image, double sigma) {
     for (int x = -reach; x < w + reach; ++x)
       std::copy_n(row + std::ptrdiff_t(3) * std::clamp(x, 0, w - 1), 3, &padded[std::size_t(x + reach) * 3]);
     std::fill_n(row, std::size_t(w) * 3, 0.f);
-    for (std::size_t k = 0; k < kernel.size(); ++k) add(row, kernel[k], &padded[k * 3], std::size_t(3) * std::size_t(w));
+    for (std::size_t k = 0; k < kernel.size(); ++k)
+      add(row, kernel[k], &padded[k * 3], std::size_t(3) * std::size_t(w));
   }
   // Down the columns: strips that stay in the cache.
   constexpr int kStrip = 96;
@@ -127,7 +129,8 @@ void blur(Image& image, double sigma) {
       float* out = image.row<float>(y) + x0;
       std::fill_n(out, n, 0.f);
       for (int k = -reach; k <= reach; ++k)
-        add(out, kernel[std::size_t(k + reach)], &strip[std::size_t(std::clamp(y + k, 0, h - 1)) * kStrip], std::size_t(n));
+        add(out, kernel[std::size_t(k + reach)], &strip[std::size_t(std::clamp(y + k, 0, h - 1)) * kStrip],
+            std::size_t(n));
     }
   }
 }

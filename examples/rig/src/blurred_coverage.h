@@ -9,8 +9,8 @@
 
 namespace lumihull::rig {
 
-/// Linear light of sheets before a background through a lens that blurs, f32, 3 channels: a Gaussian of `sigma` px (0: none)
-/// and the pixel's square. What lies beyond the picture is as at its border.
+/// Linear light of sheets before a background through a lens that blurs, f32, 3 channels: a Gaussian of `sigma` px (0:
+/// none) and the pixel's square. What lies beyond the picture is as at its border.
 Image blurred_coverage(const View& view, std::span<const FlatPrint> prints, const Eigen::Vector3f& background,
                        int lines, double sigma);
 

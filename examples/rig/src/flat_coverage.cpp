@@ -7,8 +7,9 @@
 #include <vector>
 
 // A pixel's mean colour, exactly: along a scan line through the pixel a sheet's coordinates are ratios of linear
-// functions, so that it crosses a circle where a quadratic is zero and an edge where a line is. Between two crossings the
-// colour is constant. Lines run across the edge that passes, and there are enough of them for the rule of midpoints.
+// functions, so that it crosses a circle where a quadratic is zero and an edge where a line is. Between two crossings
+// the colour is constant. Lines run across the edge that passes, and there are enough of them for the rule of
+// midpoints.
 
 namespace lumihull::rig {
 
@@ -59,8 +60,7 @@ class Sheet {
     const Vector3d t = cam_from_print.translation;
     distance_ = r.col(2).dot(t);
     for (int i = 0; i < 2; ++i)
-      from_ray_.row(i) =
-          (distance_ * r.col(i).transpose() - r.col(i).dot(t) * r.col(2).transpose()) / print.stretch[i];
+      from_ray_.row(i) = (distance_ * r.col(i).transpose() - r.col(i).dot(t) * r.col(2).transpose()) / print.stretch[i];
     from_ray_.row(2) = r.col(2).transpose();
     front_ = distance_ > 0;
     if (!front_) from_ray_ = -from_ray_, distance_ = -distance_;
@@ -90,7 +90,8 @@ class Sheet {
   template <class Visit>
   void shapes_at(const Box& box, const Visit& visit) const {
     if (!front_ || boxes_.empty()) return;
-    const int x0 = cell(box.low.x(), 0), x1 = cell(box.high.x(), 0), y0 = cell(box.low.y(), 1), y1 = cell(box.high.y(), 1);
+    const int x0 = cell(box.low.x(), 0), x1 = cell(box.high.x(), 0), y0 = cell(box.low.y(), 1),
+              y1 = cell(box.high.y(), 1);
     if (x0 == x1 && y0 == y1) {
       for (const int i : cells_[std::size_t(y0 * n_ + x0)])
         if (boxes_[std::size_t(i)].meets(box)) visit(print_->shapes[std::size_t(i)]);
@@ -109,8 +110,7 @@ class Sheet {
   void index() {
     for (const FlatShape& s : print_->shapes) {
       Box b;
-      if (s.radius > 0)
-        b.add(s.center - Vector2d::Constant(s.radius)), b.add(s.center + Vector2d::Constant(s.radius));
+      if (s.radius > 0) b.add(s.center - Vector2d::Constant(s.radius)), b.add(s.center + Vector2d::Constant(s.radius));
       for (const Vector2d& p : s.polygon)
         if (!(s.radius > 0)) b.add(p);
       boxes_.push_back(b);
@@ -302,8 +302,8 @@ void FlatCoverage::Renderer::integrate(int x, int y, float* out) {
   const double u = x + .5, v = y + .5;
   const Vector2d a = ray(u - kGauss, v - kGauss), b = ray(u + kGauss, v - kGauss), c = ray(u - kGauss, v + kGauss),
                  d = ray(u + kGauss, v + kGauss);
-  const Vector2d mean = 0.25 * (a + b + c + d), du = (b + d - a - c) / (4 * kGauss), dv = (c + d - a - b) / (4 * kGauss),
-                 duv = (a + d - b - c) / (4 * kGauss * kGauss);
+  const Vector2d mean = 0.25 * (a + b + c + d), du = (b + d - a - c) / (4 * kGauss),
+                 dv = (c + d - a - b) / (4 * kGauss), duv = (a + d - b - c) / (4 * kGauss * kGauss);
 
   // Which way do the edges run? Lines cross the first one; more of them where others run otherwise.
   Vector2d first{0, 0};
@@ -401,8 +401,14 @@ void FlatCoverage::Renderer::tile(int x0, int y0, float* out) {
   for (const Sheet& sheet : sheets_) {
     Box box;
     bool horizon = !valid;
-    for (const auto& [x, y] : {std::array{0, 0}, {width, 0}, {0, height}, {width, height}, {width / 2, 0}, {0, height / 2},
-                               {width, height / 2}, {width / 2, height}}) {
+    for (const auto& [x, y] : {std::array{0, 0},
+                               {width, 0},
+                               {0, height},
+                               {width, height},
+                               {width / 2, 0},
+                               {0, height / 2},
+                               {width, height / 2},
+                               {width / 2, height}}) {
       const Vector3d h = sheet(rays[at(x, y)]);
       if (!(h.z() > 1e-12))
         horizon = true;

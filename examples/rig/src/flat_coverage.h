@@ -9,8 +9,8 @@
 
 namespace lumihull::rig {
 
-/// Linear light of sheets before a background, 3 channels: every value is the mean over a pixel's part, of which there are
-/// `parts` x `parts` in each pixel. By rows of tiles, so that large pictures with many parts need little memory.
+/// Linear light of sheets before a background, 3 channels: every value is the mean over a pixel's part, of which there
+/// are `parts` x `parts` in each pixel. By rows of tiles, so that large pictures with many parts need little memory.
 class FlatCoverage {
  public:
   static constexpr int kTile = 16;  ///< px

@@ -117,8 +117,7 @@ Image to_srgb(const Image& light) {
   for (int y = 0; y < light.height(); ++y) {
     const float* in = light.row<float>(y);
     std::uint8_t* out = picture.row<std::uint8_t>(y);
-    for (std::size_t i = 0; i < values; ++i)
-      out[i] = table[std::size_t(std::clamp(in[i], 0.f, 1.f) * 65535.f + .5f)];
+    for (std::size_t i = 0; i < values; ++i) out[i] = table[std::size_t(std::clamp(in[i], 0.f, 1.f) * 65535.f + .5f)];
   }
   return picture;
 }

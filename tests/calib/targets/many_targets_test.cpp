@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "clutter.h"
+#include "pictures_without_targets.h"
 #include "support.h"
 #include "target_shot.h"
 
@@ -38,7 +38,8 @@ TEST(ManyTargets, AreFoundAndReadRightly) {
       SCOPED_TRACE(seed);
       Dice dice(seed);
       Seen seen;
-      seen.minor_px = dice.between(5, 10), seen.tilt_rad = dice.between(0, M_PI / 3), seen.blur_px = dice.between(.3, 1);
+      seen.minor_px = dice.between(5, 10), seen.tilt_rad = dice.between(0, M_PI / 3),
+      seen.blur_px = dice.between(.3, 1);
       seen.wide = seed % 4 == 0, seen.bayer = seed % 4 == 1, seen.jpeg = seed % 4 == 2, seen.occluded = seed % 8 == 7;
       const TargetShot shot = photograph_target(design, ids[std::size_t(seed * 37) % ids.size()], seen, seed);
       const Verdict verdict = judge(shot, design, detector.detect(shot.photo, job).targets);

@@ -100,7 +100,8 @@ TargetShot photograph_target(TargetDesign design, int id, const Seen& seen, std:
                        : i < 16 ? Vector2d(b.x(), a.y() + t * (b.y() - a.y()))
                        : i < 24 ? Vector2d(b.x() - t * (b.x() - a.x()), b.y())
                                 : Vector2d(a.x(), b.y() - t * (b.y() - a.y()));
-    if (const auto px = camera.project(pose * Vector3d(p.x(), p.y(), 0))) low = low.cwiseMin(*px), high = high.cwiseMax(*px);
+    if (const auto px = camera.project(pose * Vector3d(p.x(), p.y(), 0)))
+      low = low.cwiseMin(*px), high = high.cwiseMax(*px);
   }
   const double margin = dice.between(4, 30);
   const int x0 = int(std::floor(low.x() - margin)), y0 = int(std::floor(low.y() - margin));

@@ -16,7 +16,7 @@ struct Seen {
   double minor_px = 12;  ///< smaller axis of its circles; squares: of circles on a 5 x 5 target of the same outer size
   double tilt_rad = 0;   ///< between the sheet's normal and the line of sight
   double blur_px = .7;
-  bool wide = false;      ///< a corner of a 12-megapixel picture through a 10 mm lens, with its distortion
+  bool wide = false;  ///< a corner of a 12-megapixel picture through a 10 mm lens, with its distortion
   bool bayer = false, jpeg = false;
   bool occluded = false;  ///< a bar of paper lies over a part of it
   double noise = .01;     ///< standard deviation in linear light at white; half of its variance is shot noise
@@ -34,7 +34,8 @@ struct TargetShot {
 /// outer_m: the target's outer size; the design's own size is scaled to it.
 TargetShot photograph_target(calib::TargetDesign design, int id, const Seen& seen, std::uint64_t seed);
 
-/// A design whose outer contour is `outer_m` wide: circles with their outer circles' edges, squares with their black border.
+/// A design whose outer contour is `outer_m` wide: circles with their outer circles' edges, squares with their black
+/// border.
 calib::TargetDesign sized(calib::TargetDesign design, double outer_m);
 double outer_size(const calib::TargetDesign& design);
 
