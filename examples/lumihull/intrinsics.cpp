@@ -162,7 +162,13 @@ void say_result(Program& program, const calib::LensCalibration& found) {
   if (found.cross_validation_px >= 0)
     program.say(formatted("halves    differ by at most %.4f px, %.2f times what is expected", found.cross_validation_px,
                           found.cross_validation_sigma));
-  for (const std::string& problem : found.problems) program.say("note      " + problem);
+  // Hundreds of views may have been left out; what is said of the whole comes last.
+  constexpr std::size_t kSaid = 12;
+  const std::size_t n = found.problems.size(), skipped = n > kSaid ? n - kSaid : 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (skipped > 0 && i == kSaid / 2) program.say("note      … " + std::to_string(skipped) + " more");
+    if (i < kSaid / 2 || i >= kSaid / 2 + skipped) program.say("note      " + found.problems[i]);
+  }
 }
 
 void run(Program& program, const Arguments& a) {
