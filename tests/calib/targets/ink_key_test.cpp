@@ -61,9 +61,13 @@ TEST_F(InkKey, WithoutInkThereIsNoKey) {
   EXPECT_EQ(test::expect_error([&] { samples.train(7, job); }).code(), ErrorCode::degenerate);
   // What no detector would say must not lead outside of the picture either.
   Detections wild;
-  wild.targets.push_back({.design = 0, .id = 3, .features = {{.index = 0, .pixel = {1e9, -1e9}}}});
-  wild.targets.push_back({.design = 9, .id = 3});
-  wild.refused.push_back({.pixel = {-1e12, 5}, .size_px = 1e13});
+  wild.targets.resize(2);
+  wild.targets[0].features.resize(1);
+  wild.targets[0].features[0].pixel = {1e9, -1e9};
+  wild.targets[1].design = 9;
+  wild.refused.resize(1);
+  wild.refused[0].pixel = {-1e12, 5};
+  wild.refused[0].size_px = 1e13;
   EXPECT_NO_THROW(samples.add(photo(), set, wild));
   EXPECT_EQ(samples.ink_pixels(), 0u);
 }
