@@ -16,7 +16,8 @@ calib::LensCalibrationOptions options_from(const lh_lens_options* user, const lh
   const lh_lens_options o = read_struct(user, "options");
   calib::LensCalibrationOptions options;
   constexpr uint32_t kKnown = (1u << kIntrinsics) - 1;
-  if (o.free_parameters & ~(kKnown | LH_INTRINSIC_NONE)) invalid("expected LH_INTRINSIC_… in free_parameters", "options");
+  if (o.free_parameters & ~(kKnown | LH_INTRINSIC_NONE))
+    invalid("expected LH_INTRINSIC_… in free_parameters", "options");
   if (o.free_parameters)
     for (int i = 0; i < kIntrinsics; ++i) options.free[size_t(i)] = o.free_parameters >> i & 1u;
   options.robust = !o.keep_all;

@@ -157,11 +157,18 @@ void say_result(Program& program, const calib::LensCalibration& found) {
       std::count_if(found.residuals.begin(), found.residuals.end(), [](const auto& r) { return r.outlier; }));
   program.say("points    " + std::to_string(found.residuals.size() - outliers) + ", and " + std::to_string(outliers) +
               " outliers");
-  program.say(formatted("residuals %.4f px RMS, %.2f times what the points' covariances say", found.rms_px, found.sigma0));
+  program.say(
+      formatted("residuals %.4f px RMS, %.2f times what the points' covariances say", found.rms_px, found.sigma0));
   if (found.cross_validation_px >= 0)
     program.say(formatted("halves    differ by at most %.4f px, %.2f times what is expected", found.cross_validation_px,
                           found.cross_validation_sigma));
-  for (const std::string& problem : found.problems) program.say("note      " + problem);
+  // Hundreds of views may have been left out; what is said of the whole comes last.
+  constexpr std::size_t kSaid = 12;
+  const std::size_t n = found.problems.size(), skipped = n > kSaid ? n - kSaid : 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (skipped > 0 && i == kSaid / 2) program.say("note      … " + std::to_string(skipped) + " more");
+    if (i < kSaid / 2 || i >= kSaid / 2 + skipped) program.say("note      " + found.problems[i]);
+  }
 }
 
 void run(Program& program, const Arguments& a) {
@@ -181,8 +188,9 @@ void run(Program& program, const Arguments& a) {
   }
   program.say("found     targets in " + std::to_string(with) + " of " + std::to_string(shown.size()) + " photographs");
   if (views.empty())
-    throw Error(ErrorCode::degenerate, "no photograph shows the targets: is --targets what was printed (columns x rows "
-                                       "are those of inner corners), all of it visible and in focus?");
+    throw Error(ErrorCode::degenerate,
+                "no photograph shows the targets: is --targets what was printed (columns x rows "
+                "are those of inner corners), all of it visible and in focus?");
   const calib::LensCalibration found =
       calib::calibrate_lens(views, shown[0].width, shown[0].height, options, program.job());
   say_result(program, found);
@@ -216,9 +224,12 @@ void add_intrinsics(Program& program) {
       ->required()
       ->type_name("WORD|FILE");
   verb->add_option("--free", a->free, "parameters that are estimated [f,u0,v0,k1,k2,p1,p2]")->type_name("NAME,…");
-  verb->add_option("--fix", a->fix, "parameters that are not, of f, s, skew, u0, v0, k1, k2, k3, p1, p2")->type_name("NAME,…");
-  verb->add_option("--start", a->start, "a camera to start from, and for the values of what is fixed")->type_name("FILE");
-  verb->add_option("--outlier-sigma", a->outlier_sigma, "points farther off than this many standard deviations are left out [4]");
+  verb->add_option("--fix", a->fix, "parameters that are not, of f, s, skew, u0, v0, k1, k2, k3, p1, p2")
+      ->type_name("NAME,…");
+  verb->add_option("--start", a->start, "a camera to start from, and for the values of what is fixed")
+      ->type_name("FILE");
+  verb->add_option("--outlier-sigma", a->outlier_sigma,
+                   "points farther off than this many standard deviations are left out [4]");
   verb->add_flag("--keep-all", a->no_outliers, "plain least squares: no point is an outlier");
   verb->add_option("-o,--output", a->output, "the camera with its covariance [camera.json]")->type_name("FILE");
   verb->add_option("--opencv", a->opencv, "the camera for OpenCV, as YAML")->type_name("FILE");

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "../calib/targets/clutter.h"
+#include "../calib/targets/decoys.h"
 #include "../calib/targets/target_scene.h"
 #include "targets/circle_blobs.h"
 #include "targets/circle_lattice.h"
@@ -156,7 +156,7 @@ void clutters(int pictures, int first, const std::vector<std::string>& files) {
     found += int(d.targets.size());
   };
   const double begin = cpu_ms();
-  for (int i = first; i < first + pictures; ++i) look(test::clutter(std::uint64_t(i)), "clutter " + std::to_string(i));
+  for (int i = first; i < first + pictures; ++i) look(test::decoy(std::uint64_t(i)), "clutter " + std::to_string(i));
   for (const std::string& file : files) look(read_image(file, {.apply_orientation = false, .channels = 3, .max_file_bytes = 1u << 30}), file);
   std::printf("%d pictures of clutter, %zu photographs: %d false targets; refused: %d no code, %d homography, %d too few\n",
               pictures, files.size(), found, refused[0], refused[1], refused[3]);

@@ -74,23 +74,30 @@ int main(int argc, char **argv) {
   memset(&options, 0, sizeof options);
   options.struct_size = sizeof options;
   options.free_parameters = LH_INTRINSIC_F;
-  MUST(ctx, lh_lens_calibrate(ctx, kViews, counts, pixels, points, NULL, NULL, NULL, 1200, 900, &truth, &options, &lens));
+  MUST(ctx,
+       lh_lens_calibrate(ctx, kViews, counts, pixels, points, NULL, NULL, NULL, 1200, 900, &truth, &options, &lens));
   MUST(ctx, lh_lens_covariance(ctx, lens, covariance));
   CHECK(covariance[0] > 0 && covariance[33] == 0);
   lh_lens_destroy(lens);
   lens = NULL;
 
   options.free_parameters = 1u << 20;
-  EXPECT(ctx, LH_EINVAL, lh_lens_calibrate(ctx, kViews, counts, pixels, points, NULL, NULL, NULL, 1200, 900, NULL, &options, &lens));
+  EXPECT(ctx, LH_EINVAL,
+         lh_lens_calibrate(ctx, kViews, counts, pixels, points, NULL, NULL, NULL, 1200, 900, NULL, &options, &lens));
   CHECK_SAYS(ctx, "free_parameters");
-  EXPECT(ctx, LH_EINVAL, lh_lens_calibrate(ctx, kViews, NULL, pixels, points, NULL, NULL, NULL, 1200, 900, NULL, NULL, &lens));
-  EXPECT(ctx, LH_EINVAL, lh_lens_calibrate(ctx, kViews, counts, NULL, points, NULL, NULL, NULL, 1200, 900, NULL, NULL, &lens));
-  EXPECT(ctx, LH_EDEGENERATE, lh_lens_calibrate(ctx, 0, NULL, NULL, NULL, NULL, NULL, NULL, 1200, 900, NULL, NULL, &lens));
+  EXPECT(ctx, LH_EINVAL,
+         lh_lens_calibrate(ctx, kViews, NULL, pixels, points, NULL, NULL, NULL, 1200, 900, NULL, NULL, &lens));
+  EXPECT(ctx, LH_EINVAL,
+         lh_lens_calibrate(ctx, kViews, counts, NULL, points, NULL, NULL, NULL, 1200, 900, NULL, NULL, &lens));
+  EXPECT(ctx, LH_EDEGENERATE,
+         lh_lens_calibrate(ctx, 0, NULL, NULL, NULL, NULL, NULL, NULL, 1200, 900, NULL, NULL, &lens));
   counts[2] = (size_t)-1;
-  EXPECT(ctx, LH_EINVAL, lh_lens_calibrate(ctx, kViews, counts, pixels, points, NULL, NULL, NULL, 1200, 900, NULL, NULL, &lens));
+  EXPECT(ctx, LH_EINVAL,
+         lh_lens_calibrate(ctx, kViews, counts, pixels, points, NULL, NULL, NULL, 1200, 900, NULL, NULL, &lens));
   counts[2] = kPoints;
   pixels[40] = NAN;
-  EXPECT(ctx, LH_EINVAL, lh_lens_calibrate(ctx, kViews, counts, pixels, points, NULL, NULL, NULL, 1200, 900, NULL, NULL, &lens));
+  EXPECT(ctx, LH_EINVAL,
+         lh_lens_calibrate(ctx, kViews, counts, pixels, points, NULL, NULL, NULL, 1200, 900, NULL, NULL, &lens));
   EXPECT(ctx, LH_ENOTFOUND, lh_lens_load(ctx, "/nowhere/camera.json", &lens));
   CHECK(lens == NULL);
   lh_lens_destroy(NULL);

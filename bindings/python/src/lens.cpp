@@ -111,15 +111,17 @@ void bind_calibration(py::module_& module) {
             return out;
           },
           "Of the parameters that were estimated, by name.")
-      .def_property_readonly("poses", [](const Lens& lens) { return lens.value.cam_from_board; },
-                             "cam_from_board of each view; None where it could not be used.")
+      .def_property_readonly(
+          "poses", [](const Lens& lens) { return lens.value.cam_from_board; },
+          "cam_from_board of each view; None where it could not be used.")
       .def_property_readonly("residuals", &residuals_of, "A view: (n, 2), measured less predicted, px.")
       .def_property_readonly("outliers", &outliers_of, "A view: (n,), True for points that do not count.")
       .def_property_readonly("problems", [](const Lens& lens) { return lens.value.problems; })
       .def_property_readonly("rms_px", [](const Lens& lens) { return lens.value.rms_px; })
       .def_property_readonly("sigma0", [](const Lens& lens) { return lens.value.sigma0; })
       .def_property_readonly("cross_validation_px", [](const Lens& lens) { return lens.value.cross_validation_px; })
-      .def_property_readonly("cross_validation_sigma", [](const Lens& lens) { return lens.value.cross_validation_sigma; })
+      .def_property_readonly("cross_validation_sigma",
+                             [](const Lens& lens) { return lens.value.cross_validation_sigma; })
       .def(
           "projection_uncertainty",
           [](const Lens& lens, int columns, int rows) {
@@ -129,17 +131,23 @@ void bind_calibration(py::module_& module) {
             return out;
           },
           "columns"_a = 32, "rows"_a = 24,
-          "(rows, columns): standard deviation of a distant point's pixel over the picture, the best rotation taken off.")
-      .def("save", [](const Lens& lens, const std::filesystem::path& file) { calib::save_intrinsics(file, lens.value); },
-           "file"_a)
-      .def_static("load", [](const std::filesystem::path& file) { return Lens{calib::load_intrinsics(file), {}}; },
-                  "file"_a, "Camera and covariance from a file that `save` wrote.");
+          "(rows, columns): standard deviation of a distant point's pixel over the picture, the best rotation taken "
+          "off.")
+      .def(
+          "save", [](const Lens& lens, const std::filesystem::path& file) { calib::save_intrinsics(file, lens.value); },
+          "file"_a)
+      .def_static(
+          "load",
+          [](const std::filesystem::path& file) {
+            return Lens{calib::load_intrinsics(file), {}};
+          },
+          "file"_a, "Camera and covariance from a file that `save` wrote.");
   module.def(
       "calibrate_lens",
-      [](const Arrays& pixels, const Arrays& points, int width, int height,
-         const std::optional<Arrays>& covariances, const std::optional<Arrays>& radii,
-         const std::optional<std::vector<std::string>>& free, const std::optional<Camera>& start, bool robust,
-         double outlier_sigma, const py::object& progress, unsigned threads) {
+      [](const Arrays& pixels, const Arrays& points, int width, int height, const std::optional<Arrays>& covariances,
+         const std::optional<Arrays>& radii, const std::optional<std::vector<std::string>>& free,
+         const std::optional<Camera>& start, bool robust, double outlier_sigma, const py::object& progress,
+         unsigned threads) {
         const auto views = views_from(pixels, points, covariances, radii);
         calib::LensCalibrationOptions options;
         if (free) options.free = free_of(*free);
@@ -152,22 +160,26 @@ void bind_calibration(py::module_& module) {
         for (const auto& view : views) lens.counts.push_back(view.matches.size());
         return lens;
       },
-      "pixels"_a, "points"_a, "width"_a, "height"_a, py::kw_only(), "covariances"_a = py::none(), "radii"_a = py::none(),
-      "free"_a = py::none(), "start"_a = py::none(), "robust"_a = true, "outlier_sigma"_a = 4.0,
+      "pixels"_a, "points"_a, "width"_a, "height"_a, py::kw_only(), "covariances"_a = py::none(),
+      "radii"_a = py::none(), "free"_a = py::none(), "start"_a = py::none(), "robust"_a = true, "outlier_sigma"_a = 4.0,
       "progress"_a = py::none(), "threads"_a = 0,
-      "A camera and its lens from views of a body: for each view pixels (n, 2) and places on the body (n, 3). covariances: "
-      "(n, 2, 2) a view, px²; radii: (n,), > 0 for circles in z = 0, whose ellipses' centres the pixels are. free: names "
+      "A camera and its lens from views of a body: for each view pixels (n, 2) and places on the body (n, 3). "
+      "covariances: "
+      "(n, 2, 2) a view, px²; radii: (n,), > 0 for circles in z = 0, whose ellipses' centres the pixels are. free: "
+      "names "
       "of what is estimated, by default f, u0, v0, k1, k2, p1, p2.");
   module.def(
       "find_point_grid",
       [](const Image& photo, const std::string& grid, const py::object& progress, unsigned threads) -> py::object {
         const calib::TargetSet set = calib::TargetSet::from_word(grid);
-        if (set.grids.size() != 1 || !set.designs.empty()) invalid("expected one grid, as \"chessboard:9x6:25mm\"", "grid");
+        if (set.grids.size() != 1 || !set.designs.empty())
+          invalid("expected one grid, as \"chessboard:9x6:25mm\"", "grid");
         const auto found =
             work(progress, threads, [&](Job& job) { return calib::find_point_grid(photo, set.grids[0], job); });
         if (!found) return py::none();
         const auto n = py::ssize_t(found->features.size());
-        Array<double> pixels({n, py::ssize_t(2)}), points({n, py::ssize_t(3)}), covariances({n, py::ssize_t(2), py::ssize_t(2)});
+        Array<double> pixels({n, py::ssize_t(2)}), points({n, py::ssize_t(3)}),
+            covariances({n, py::ssize_t(2), py::ssize_t(2)});
         for (py::ssize_t i = 0; i < n; ++i) {
           const calib::Feature& f = found->features[std::size_t(i)];
           Eigen::Map<Eigen::Vector2d>(pixels.mutable_data() + 2 * i) = f.pixel;
@@ -178,7 +190,8 @@ void bind_calibration(py::module_& module) {
         return py::make_tuple(pixels, points, covariances);
       },
       "photo"_a, "grid"_a, py::kw_only(), "progress"_a = py::none(), "threads"_a = 0,
-      "Finds and measures a field of points, as \"chessboard:9x6:25mm\" or \"circles:11x8:15mm\": pixels (n, 2), places on the "
+      "Finds and measures a field of points, as \"chessboard:9x6:25mm\" or \"circles:11x8:15mm\": pixels (n, 2), "
+      "places on the "
       "board (n, 3), covariances (n, 2, 2); None where there is none.");
 }
 

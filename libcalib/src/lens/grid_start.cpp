@@ -32,8 +32,8 @@ std::vector<Eigen::Vector2d> grid_start(const Image& photo, const PointGrid& gri
   const double scale = std::max(1.0, double(side) / kLargestSide);
   cv::Mat small = picture;
   if (scale > 1)
-    cv::resize(picture, small,
-               {std::max(1, int(photo.width() / scale)), std::max(1, int(photo.height() / scale))}, 0, 0, cv::INTER_AREA);
+    cv::resize(picture, small, {std::max(1, int(photo.width() / scale)), std::max(1, int(photo.height() / scale))}, 0,
+               0, cv::INTER_AREA);
   const double scale_x = double(photo.width()) / small.cols, scale_y = double(photo.height()) / small.rows;
 
   const cv::Size size(grid.columns, grid.rows);
@@ -42,9 +42,10 @@ std::vector<Eigen::Vector2d> grid_start(const Image& photo, const PointGrid& gri
   if (grid.kind == PointGrid::Kind::circles) {
     good = find_circles(small, size, found);
   } else {
-    good = cv::findChessboardCornersSB(small, size, found, cv::CALIB_CB_NORMALIZE_IMAGE) ||
-           cv::findChessboardCorners(small, size, found,
-                                     cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK);
+    good =
+        cv::findChessboardCornersSB(small, size, found, cv::CALIB_CB_NORMALIZE_IMAGE) ||
+        cv::findChessboardCorners(
+            small, size, found, cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK);
   }
   std::vector<Eigen::Vector2d> points;
   if (!good || found.size() != std::size_t(grid.columns) * std::size_t(grid.rows)) return points;

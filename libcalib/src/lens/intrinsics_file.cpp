@@ -78,7 +78,8 @@ LensCalibration load_intrinsics(const std::filesystem::path& file) {
   Eigen::Matrix<double, kIntrinsics, 1> unit;
   for (int i = 0; i < kIntrinsics; ++i) unit(i) = c(i, i) > 0 ? 1 / std::sqrt(c(i, i)) : 0;
   const Eigen::Matrix<double, kIntrinsics, kIntrinsics> scaled = unit.asDiagonal() * c * unit.asDiagonal();
-  if (!(Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, kIntrinsics, kIntrinsics>>(scaled).eigenvalues()(0) > -1e-6))
+  if (!(Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, kIntrinsics, kIntrinsics>>(scaled).eigenvalues()(0) >
+        -1e-6))
     rows.fail("a covariance (no negative eigenvalue)");
   for (int i = 0; i < kIntrinsics; ++i)
     if (!(c(i, i) > 0) && !c.row(i).isZero(0)) rows.at(std::size_t(i)).fail("zeros where the variance is 0");

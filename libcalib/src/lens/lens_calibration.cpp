@@ -64,8 +64,8 @@ std::vector<std::vector<double>> distances(const Camera& camera, const std::vect
   return all;
 }
 
-/// Standard deviation by the median of all distances, of which half may be anything: that of a 2-D normal distribution is
-/// sqrt(2 ln 2).
+/// Standard deviation by the median of all distances, of which half may be anything: that of a 2-D normal distribution
+/// is sqrt(2 ln 2).
 double robust_sigma(const std::vector<std::vector<double>>& all) {
   std::vector<double> d;
   for (const auto& own : all) d.insert(d.end(), own.begin(), own.end());
@@ -91,8 +91,9 @@ void drop_bad_views(std::vector<FittedView>& views, std::vector<std::string>& pr
   std::erase_if(views, [&](const FittedView& view) {
     const auto good = std::count(view.counts.begin(), view.counts.end(), 1);
     if (good >= 4 && 2 * std::size_t(good) >= view.counts.size()) return false;
-    problems.push_back("view " + view.view->name + " was left out: " + std::to_string(view.counts.size() - std::size_t(good)) +
-                       " of its " + std::to_string(view.counts.size()) + " points disagree with the other views");
+    problems.push_back("view " + view.view->name +
+                       " was left out: " + std::to_string(view.counts.size() - std::size_t(good)) + " of its " +
+                       std::to_string(view.counts.size()) + " points disagree with the other views");
     return true;
   });
   if (views.empty())
@@ -125,7 +126,8 @@ void check_orientations(const lens::LensStart& start, const LensCalibrationOptio
   if (wanted <= given) return;
   if (start.views.size() > 1 && given == 2) fail_parallel();
   throw Error(ErrorCode::degenerate,
-              "too few views of a plane: they give " + std::to_string(given) + " equations for " + std::to_string(wanted) +
+              "too few views of a plane: they give " + std::to_string(given) + " equations for " +
+                  std::to_string(wanted) +
                   " of f, s, skew, u0, v0; take 10 to 20, tilted in all directions, or fix some of these");
 }
 
@@ -206,9 +208,11 @@ LensCalibration calibrate_lens(std::span<const BoardView> views, int width, int 
   if (!(normal.least_eigenvalue > kSingular)) fail_weak(start, "the normal equations are singular");
   result.sigma0 = sigma0_of(normal);
   result.covariance = normal.covariance * std::max(1.0, result.sigma0 * result.sigma0);
-  if (const double sigma_f = std::sqrt(normal.covariance(0, 0)) * std::max(result.sigma0, kLeastSigma) / result.camera.f;
+  if (const double sigma_f =
+          std::sqrt(normal.covariance(0, 0)) * std::max(result.sigma0, kLeastSigma) / result.camera.f;
       !(sigma_f < 0.3))
-    fail_weak(start, "the focal length's standard deviation is " + std::to_string(int(std::min(1e6, 100 * sigma_f))) + " %");
+    fail_weak(start,
+              "the focal length's standard deviation is " + std::to_string(int(std::min(1e6, 100 * sigma_f))) + " %");
 
   result.cam_from_board.resize(views.size());
   double sum = 0;

@@ -95,7 +95,8 @@ std::string by_radius(const LensCalibration& c, const std::vector<Seen>& seen) {
     const double mean = sum[b] / n[b], deviation = std::sqrt(std::max(0.0, squares[b] / n[b] - mean * mean));
     const double x0 = farthest * i / kBins, x1 = farthest * (i + 1) / kBins;
     figure.line(x0, mean, x1, mean, "mean");
-    for (const double sign : {-1.0, 1.0}) figure.line(x0, mean + sign * deviation, x1, mean + sign * deviation, "level");
+    for (const double sign : {-1.0, 1.0})
+      figure.line(x0, mean + sign * deviation, x1, mean + sign * deviation, "level");
   }
   return figure.str();
 }
@@ -124,7 +125,8 @@ std::string map_color(double t) {
   char text[8];
   int rgb[3];
   for (int k = 0; k < 3; ++k) rgb[k] = int(kStops[i][k] + (t - i) * (kStops[i + 1][k] - kStops[i][k]) + 0.5);
-  std::snprintf(text, sizeof text, "#%02x%02x%02x", unsigned(rgb[0]) & 255u, unsigned(rgb[1]) & 255u, unsigned(rgb[2]) & 255u);
+  std::snprintf(text, sizeof text, "#%02x%02x%02x", unsigned(rgb[0]) & 255u, unsigned(rgb[1]) & 255u,
+                unsigned(rgb[2]) & 255u);
   return text;
 }
 
@@ -142,12 +144,14 @@ std::string uncertainty_map(const LensCalibration& c) {
   for (int i = 0; i < kColumns * kRows; ++i) {
     const double x = w * (i % kColumns) / kColumns, y = h * (i / kColumns) / kRows, s = sigma[std::size_t(i)];
     // Logarithmic: corners are often ten times worse than the middle.
-    const double t = high > low && s > 0 ? std::log(s / std::max(low, 1e-300)) / std::log(high / std::max(low, 1e-300)) : 0;
+    const double t =
+        high > low && s > 0 ? std::log(s / std::max(low, 1e-300)) / std::log(high / std::max(low, 1e-300)) : 0;
     figure.box(x, y, x + w / kColumns, y + h / kRows, std::isfinite(s) ? map_color(t) : "#808080");
   }
   for (int y = 2; y < kRows; y += 5)
     for (int x = 2; x < kColumns; x += 7)
-      figure.text(w * (x + 0.5) / kColumns, h * (y + 0.5) / kRows, number("%.2g", sigma[std::size_t(y * kColumns + x)]), "onmap");
+      figure.text(w * (x + 0.5) / kColumns, h * (y + 0.5) / kRows, number("%.2g", sigma[std::size_t(y * kColumns + x)]),
+                  "onmap");
   return figure.str();
 }
 
@@ -196,9 +200,9 @@ std::string lens_report_html(const LensCalibration& c, std::span<const BoardView
   page += row("RMS residual", number("%.4f", c.rms_px) + " px");
   page += row("residuals over their covariances", number("%.3f", c.sigma0));
   if (c.cross_validation_px >= 0)
-    page += row("two halves of the views differ by at most",
-                number("%.4f", c.cross_validation_px) + " px, " + number("%.2f", c.cross_validation_sigma) +
-                    " of what is expected");
+    page += row("two halves of the views differ by at most", number("%.4f", c.cross_validation_px) + " px, " +
+                                                                 number("%.2f", c.cross_validation_sigma) +
+                                                                 " of what is expected");
   page += "</table>\n";
   page += vectors(c, seen) + by_radius(c, seen) + by_view(c, views, seen) + uncertainty_map(c);
   page += "<h2>Views</h2>\n<table>\n";

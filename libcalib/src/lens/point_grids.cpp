@@ -43,13 +43,15 @@ Lattice mirrored(Lattice lattice) {
 Lattice turned(const Lattice& lattice) {
   Lattice out = lattice;
   for (int y = 0; y < lattice.rows; ++y)
-    for (int x = 0; x < lattice.columns; ++x) out.points[std::size_t(y * out.columns + x)] = lattice.at(y, lattice.rows - 1 - x);
+    for (int x = 0; x < lattice.columns; ++x)
+      out.points[std::size_t(y * out.columns + x)] = lattice.at(y, lattice.rows - 1 - x);
   return out;
 }
 
 /// Twice the area of the outline, positive where rows and columns run as x and y do.
 double area(const Lattice& l) {
-  const std::array<Vector2d, 4> corners{l.at(0, 0), l.at(l.columns - 1, 0), l.at(l.columns - 1, l.rows - 1), l.at(0, l.rows - 1)};
+  const std::array<Vector2d, 4> corners{l.at(0, 0), l.at(l.columns - 1, 0), l.at(l.columns - 1, l.rows - 1),
+                                        l.at(0, l.rows - 1)};
   double sum = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     const Vector2d &a = corners[i], &b = corners[(i + 1) % 4];
@@ -59,7 +61,8 @@ double area(const Lattice& l) {
 }
 
 double value_at(const LightPlane& plane, const Vector2d& px) {
-  const int x = std::clamp(int(px.x()), 0, plane.values.width() - 1), y = std::clamp(int(px.y()), 0, plane.values.height() - 1);
+  const int x = std::clamp(int(px.x()), 0, plane.values.width() - 1),
+            y = std::clamp(int(px.y()), 0, plane.values.height() - 1);
   return plane.values.row<float>(y)[x];
 }
 
@@ -103,7 +106,8 @@ struct CornerFrame {
 
 CornerFrame frame_at(const Lattice& l, int x, int y) {
   CornerFrame frame;
-  const int xa = std::max(0, x - 1), xb = std::min(l.columns - 1, x + 1), ya = std::max(0, y - 1), yb = std::min(l.rows - 1, y + 1);
+  const int xa = std::max(0, x - 1), xb = std::min(l.columns - 1, x + 1), ya = std::max(0, y - 1),
+            yb = std::min(l.rows - 1, y + 1);
   frame.along_row = (l.at(xb, y) - l.at(xa, y)) / (xb - xa);
   frame.along_column = (l.at(x, yb) - l.at(x, ya)) / (yb - ya);
   frame.room = 1e9;
@@ -111,7 +115,8 @@ CornerFrame frame_at(const Lattice& l, int x, int y) {
     return std::abs(step.x() * along.y() - step.y() * along.x()) / std::max(1e-9, along.norm());
   };
   for (const int nx : {x - 1, x + 1})
-    if (nx >= 0 && nx < l.columns) frame.room = std::min(frame.room, across(l.at(nx, y) - l.at(x, y), frame.along_column));
+    if (nx >= 0 && nx < l.columns)
+      frame.room = std::min(frame.room, across(l.at(nx, y) - l.at(x, y), frame.along_column));
   for (const int ny : {y - 1, y + 1})
     if (ny >= 0 && ny < l.rows) frame.room = std::min(frame.room, across(l.at(x, ny) - l.at(x, y), frame.along_row));
   return frame;

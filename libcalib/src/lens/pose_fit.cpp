@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -128,15 +129,17 @@ void minimise(ResectionPoints& points, std::span<const double> weights, double c
   run(points, weights, cauchy, max_iterations, fit);
   if (points.lens.empty() || !lens) return;
   constexpr int kRounds = 8;
+  const double freedom = std::max(1.0, 2 * double(std::count(weights.begin(), weights.end(), 1.0)) - 6);
   for (int round = 0; round < kRounds; ++round) {
     const LocalPose before = fit.pose;
     points.renew_lens_terms(fit.pose);
     run(points, weights, cauchy, max_iterations, fit);
-    // How far the pose went, in units of what its uncertainty explains.
+    // How far the pose went, in standard deviations. The terms change by a hundredth or less of what the pose does, so
+    // that a thirtieth of one leaves nothing to be seen.
     Vector6d motion;
     const Eigen::AngleAxisd turn(Matrix3d(fit.pose.rotation * before.rotation.transpose()));
     motion << turn.angle() * turn.axis(), fit.pose.center - before.center;
-    if (motion.dot(fit.at.information * motion) <= 1e-8 * fit.at.cost) break;
+    if (motion.dot(fit.at.information * motion) <= 1e-3 * fit.at.cost / freedom) break;
   }
 }
 

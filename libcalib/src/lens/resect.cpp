@@ -32,6 +32,8 @@ constexpr double kFlat = 0.02, kNearlyFlat = 0.2;
 constexpr double kAgreement = 0.02;
 /// Residuals that are larger than their covariances say by this factor may be those of many wrong matches.
 constexpr double kSuspicious = 3;
+/// Twice the logarithm of the odds beyond which another pose is not mentioned.
+constexpr double kRefuted = 25;
 /// log10 of the number of false alarms below which matches agree by more than chance.
 constexpr double kCertain = -3;
 
@@ -61,7 +63,7 @@ class Resecting {
 
   Resection run() {
     Selection best;
-    if (!from_all(best) && !from_samples(best) && fallback_) best = std::move(*fallback_);
+    if (!from_all(best) && !from_samples(best) && fallback_) best = std::move(*fallback_), renew_ = true;
     if (best.count == 0) {
       if (reflected_)
         degenerate(
@@ -203,6 +205,7 @@ class Resecting {
         if (same_matches && angle_between(s.fit.pose, best.fit.pose) > 0.01)
           runner_up_ = better ? best.fit.pose : s.fit.pose;
         if (better) best = std::move(s), found = true;
+        renew_ = true;
       }
       if (found && best.count >= 0.5 * double(matches_.size())) break;
     }
@@ -225,9 +228,15 @@ class Resecting {
     Selection other = best;
     other.fit.pose = nearly_flat ? mirrored(points_, best.fit.pose) : *runner_up_;
     other.fit.iterations = 0;
-    minimise(points_, other.weights, 0, options_.max_iterations, true, other.fit);
-    if (!std::isfinite(other.fit.at.cost) || !other.fit.regular || angle_between(other.fit.pose, best.fit.pose) < 0.01)
-      return;
+    const double freedom = 2.0 * best.count - 6;
+    for (const bool lens : {false, true}) {  // most are refuted before the lens makes a difference
+      renew_ = renew_ || lens;
+      minimise(points_, other.weights, 0, options_.max_iterations, lens, other.fit);
+      if (!std::isfinite(other.fit.at.cost) || !other.fit.regular ||
+          angle_between(other.fit.pose, best.fit.pose) < 0.01)
+        return;
+      if (!lens && freedom * std::log(other.fit.at.cost / std::max(best.fit.at.cost, 1e-300)) > 4 * kRefuted) return;
+    }
     if (other.fit.at.cost < best.fit.at.cost) {
       std::swap(other.fit, best.fit);
       if (robust_ && best.count < int(matches_.size())) {
@@ -236,13 +245,13 @@ class Resecting {
       }
     }
     const double ratio = std::max(1.0, other.fit.at.cost / std::max(best.fit.at.cost, 1e-300));
-    if ((2.0 * best.count - 6) * std::log(ratio) > 25) return;
+    if (freedom * std::log(ratio) > kRefuted) return;
     alternative_ = other.fit.pose;
     alternative_ratio_ = ratio;
   }
 
   Resection result(Selection& best) {
-    points_.renew_lens_terms(best.fit.pose);
+    if (renew_) points_.renew_lens_terms(best.fit.pose);
     const NormalEquations at = normal_equations(points_, best.fit.pose, best.weights, 0);
     if (!best.fit.regular || !std::isfinite(at.cost)) degenerate("the matches don't determine a pose");
     Resection r;
@@ -293,6 +302,7 @@ class Resecting {
   int seen_ = 0;
   double sigma_px_ = 0;  ///< RMS of the matches' standard deviations
   bool reflected_ = false;
+  bool renew_ = false;  ///< the lens terms are those of another pose
   std::vector<double> d2_, ordered_;
   std::optional<Selection> fallback_;  ///< all matches, where leaving some out can't be justified
   std::optional<LocalPose> runner_up_, alternative_;

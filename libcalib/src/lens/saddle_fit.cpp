@@ -23,7 +23,8 @@ struct Sample {
 /// The model at a pixel's centre and its derivatives. The blur includes the pixel's own width.
 double model(const Vector9& p, double x, double y, Vector9* gradient) {
   const double dx = x - p(kX), dy = y - p(kY);
-  const double c1 = std::cos(p(kAngle1)), s1 = std::sin(p(kAngle1)), c2 = std::cos(p(kAngle2)), s2 = std::sin(p(kAngle2));
+  const double c1 = std::cos(p(kAngle1)), s1 = std::sin(p(kAngle1)), c2 = std::cos(p(kAngle2)),
+               s2 = std::sin(p(kAngle2));
   // Distances from the edges: normals are the directions turned by 90 degrees.
   const double d1 = -s1 * dx + c1 * dy, d2 = -s2 * dx + c2 * dy;
   const double scale = 1 / (std::numbers::sqrt2 * p(kBlur));

@@ -20,13 +20,13 @@ struct Saddle {
 };
 
 /// Fits (1 + g·d) (m + c E(n1·d) E(n2·d)), d = pixel - crossing, E the error function of an edge with Gaussian blur, to
-/// the disc of `radius` px about `start`: nine unknowns (crossing, both edges' directions, m, c, blur, light's gradient g).
-/// The pattern is symmetric about its crossing, and so is what blur makes of it: that E1 E2 is only exact for right angles
-/// does not move the crossing. Pixels are weighted by their noise, and the covariance is (JᵀWJ)⁻¹, times the residuals'
-/// mean square where that is above what noise explains.
+/// the disc of `radius` px about `start`: nine unknowns (crossing, both edges' directions, m, c, blur, light's gradient
+/// g). The pattern is symmetric about its crossing, and so is what blur makes of it: that E1 E2 is only exact for right
+/// angles does not move the crossing. Pixels are weighted by their noise, and the covariance is (JᵀWJ)⁻¹, times the
+/// residuals' mean square where that is above what noise explains.
 ///
-/// along1, along2: the edges' directions, to about 15 degrees. nullopt: the disc leaves the picture, no contrast, or the fit
-/// leaves its start by more than half the radius.
+/// along1, along2: the edges' directions, to about 15 degrees. nullopt: the disc leaves the picture, no contrast, or
+/// the fit leaves its start by more than half the radius.
 std::optional<Saddle> fit_saddle(const LightPlane& plane, const Eigen::Vector2d& start, const Eigen::Vector2d& along1,
                                  const Eigen::Vector2d& along2, double radius);
 

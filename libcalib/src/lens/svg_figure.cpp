@@ -25,11 +25,20 @@ std::string painted(std::string_view style) {
 std::string html_text(std::string_view text) {
   std::string out;
   for (const char c : text) switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += std::uint8_t(c) < 32 || c == 127 ? ' ' : c;
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += std::uint8_t(c) < 32 || c == 127 ? ' ' : c;
     }
   return out;
 }
@@ -61,7 +70,8 @@ void SvgFigure::axes(double x0, double x1, double y0, double y1, const std::stri
                      const std::string& y_label) {
   x0_ = x0, x1_ = x1 != x0 ? x1 : x0 + 1, y0_ = y0, y1_ = y1 != y0 ? y1 : y0 + 1;
   const double dx = tick_step(std::abs(x1_ - x0_), 8), dy = tick_step(std::abs(y1_ - y0_), 6);
-  const double left = std::min(x0_, x1_), right = std::max(x0_, x1_), low = std::min(y0_, y1_), high = std::max(y0_, y1_);
+  const double left = std::min(x0_, x1_), right = std::max(x0_, x1_), low = std::min(y0_, y1_),
+               high = std::max(y0_, y1_);
   for (double i = std::ceil(left / dx - 1e-9); i * dx <= right + 1e-9 * dx; ++i) {
     line(i * dx, y0_, i * dx, y1_, "grid");
     body_ += "<text class=\"small\" x=\"" + px(x_of(i * dx)) + "\" y=\"" + px(height_ - kBottom + 15) +
@@ -73,9 +83,9 @@ void SvgFigure::axes(double x0, double x1, double y0, double y1, const std::stri
              "\" text-anchor=\"end\">" + number("%.6g", i * dy + 0.0) + "</text>\n";
   }
   body_ += "<text class=\"small\" x=\"" + px(0.5 * (kLeft + width_ - kRight)) + "\" y=\"" + px(height_ - 10) +
-           "\" text-anchor=\"middle\">" + html_text(x_label) + "</text>\n<text class=\"small\" transform=\"translate(14 " +
-           px(0.5 * (kTop + height_ - kBottom)) + ") rotate(-90)\" text-anchor=\"middle\">" + html_text(y_label) +
-           "</text>\n";
+           "\" text-anchor=\"middle\">" + html_text(x_label) +
+           "</text>\n<text class=\"small\" transform=\"translate(14 " + px(0.5 * (kTop + height_ - kBottom)) +
+           ") rotate(-90)\" text-anchor=\"middle\">" + html_text(y_label) + "</text>\n";
 }
 
 void SvgFigure::line(double x0, double y0, double x1, double y1, std::string_view style) {
@@ -84,13 +94,14 @@ void SvgFigure::line(double x0, double y0, double x1, double y1, std::string_vie
 }
 
 void SvgFigure::dot(double x, double y, double radius_px, std::string_view style) {
-  body_ += "<circle" + painted(style) + " cx=\"" + px(x_of(x)) + "\" cy=\"" + px(y_of(y)) + "\" r=\"" + px(radius_px) + "\"/>\n";
+  body_ += "<circle" + painted(style) + " cx=\"" + px(x_of(x)) + "\" cy=\"" + px(y_of(y)) + "\" r=\"" + px(radius_px) +
+           "\"/>\n";
 }
 
 void SvgFigure::box(double x0, double y0, double x1, double y1, std::string_view style) {
   const double a = x_of(x0), b = x_of(x1), c = y_of(y0), d = y_of(y1);
-  body_ += "<rect shape-rendering=\"crispEdges\"" + painted(style) + " x=\"" + px(std::min(a, b)) + "\" y=\"" + px(std::min(c, d)) + "\" width=\"" +
-           px(std::abs(b - a)) + "\" height=\"" + px(std::abs(d - c)) + "\"/>\n";
+  body_ += "<rect shape-rendering=\"crispEdges\"" + painted(style) + " x=\"" + px(std::min(a, b)) + "\" y=\"" +
+           px(std::min(c, d)) + "\" width=\"" + px(std::abs(b - a)) + "\" height=\"" + px(std::abs(d - c)) + "\"/>\n";
 }
 
 void SvgFigure::text(double x, double y, const std::string& words, std::string_view style, const char* anchor) {
@@ -104,13 +115,16 @@ std::string SvgFigure::str() const {
   return "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + px(width_) + " " + px(height_) + "\" width=\"" +
          px(width_) + "\" height=\"" + px(height_) + "\" role=\"img\"><title>" + html_text(title_) + "</title>\n" +
          "<text class=\"heading\" x=\"" + px(kLeft) + "\" y=\"18\">" + html_text(title_) + "</text>\n" +
-         "<text class=\"small\" x=\"" + px(kLeft) + "\" y=\"36\">" + html_text(note_) + "</text>\n" + body_ + "</svg>\n";
+         "<text class=\"small\" x=\"" + px(kLeft) + "\" y=\"36\">" + html_text(note_) + "</text>\n" + body_ +
+         "</svg>\n";
 }
 
 std::string SvgFigure::style_sheet() {
   return "svg{max-width:100%;height:auto}svg text{fill:#222;font-family:system-ui,sans-serif}.small{font-size:11px}"
-         ".heading{font-size:14px;font-weight:600}.grid{stroke:#ddd;stroke-width:1}.arrow{stroke:#3b78d8;stroke-width:1}"
-         ".wrong{stroke:#d9622b;stroke-width:1.2}.mean{stroke:#2c9c5a;stroke-width:2}.point{fill:#3b78d8;fill-opacity:.45}"
+         ".heading{font-size:14px;font-weight:600}.grid{stroke:#ddd;stroke-width:1}.arrow{stroke:#3b78d8;stroke-width:"
+         "1}"
+         ".wrong{stroke:#d9622b;stroke-width:1.2}.mean{stroke:#2c9c5a;stroke-width:2}.point{fill:#3b78d8;fill-opacity:."
+         "45}"
          ".outlier{fill:#d9622b}.bar{fill:#3b78d8}.level{stroke:#666;stroke-width:1.5;stroke-dasharray:6 4}"
          ".onmap{font-size:11px;paint-order:stroke;stroke:#fff;stroke-width:3px;stroke-linejoin:round}"
          "svg text.onmap{fill:#111}@media (prefers-color-scheme:dark){svg text{fill:#e8e8e8}.grid{stroke:#353941}"

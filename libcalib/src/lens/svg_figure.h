@@ -27,7 +27,8 @@ class SvgFigure {
   void dot(double x, double y, double radius_px, std::string_view style);
   /// Corners in data; `style` a class, or a colour where it begins with '#'.
   void box(double x0, double y0, double x1, double y1, std::string_view style);
-  void text(double x, double y, const std::string& words, std::string_view style = "small", const char* anchor = "middle");
+  void text(double x, double y, const std::string& words, std::string_view style = "small",
+            const char* anchor = "middle");
   /// Below the title.
   void note(const std::string& words);
 

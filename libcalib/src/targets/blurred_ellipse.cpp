@@ -2,7 +2,6 @@
 #include "blurred_ellipse.h"
 
 #include <Eigen/LU>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -36,7 +35,10 @@ void BlurredEllipse::add_contour(const Eigen::Vector2d& center, const Eigen::Mat
   double c = 1, sn = 0;
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector2d u(c, sn), arm = root * u, q = center + ratio * arm, n = sign * (normals * u);
-    nodes_.push_back({float(q.x() / s_), float(q.y() / s_), float(n.x() / s_), float(n.y() / s_),
+    nodes_.push_back({float(q.x() / s_),
+                      float(q.y() / s_),
+                      float(n.x() / s_),
+                      float(n.y() / s_),
                       {float(ratio * n.x() * c), float(ratio * (n.x() * sn + n.y() * c)), float(ratio * n.y() * sn)},
                       sign < 0 ? float(n.dot(arm)) : 0.0f});
     const double next = c * c1 - sn * s1;
@@ -57,7 +59,8 @@ void BlurredEllipse::evaluate(const Pixels& p, Share& share) const {
   const float scale = float(1 / s_);
   const Lanes px = p.x * all(scale), py = p.y * all(scale);
   // What a group must reach to have a part: across u within the Gaussian, along u not behind the pixels.
-  Group window{scale * p.low_x - kReach, scale * p.high_x + kReach, scale * p.low_y - kReach, scale * p.high_y + kReach};
+  Group window{scale * p.low_x - kReach, scale * p.high_x + kReach, scale * p.low_y - kReach,
+               scale * p.high_y + kReach};
   constexpr float kFar = 1e30f;
   if (p.side == right) window.high_x = kFar;
   if (p.side == left) window.low_x = -kFar;
@@ -69,7 +72,8 @@ void BlurredEllipse::evaluate(const Pixels& p, Share& share) const {
   Lanes w = all(0), cx = w, cy = w, r0 = w, r1 = w, r2 = w, by_s = w, fourth = w, ratio = w;
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& box = groups_[g];
-    if (box.low_x > window.high_x || box.high_x < window.low_x || box.low_y > window.high_y || box.high_y < window.low_y)
+    if (box.low_x > window.high_x || box.high_x < window.low_x || box.low_y > window.high_y ||
+        box.high_y < window.low_y)
       continue;
     const float nearest = p.side == right    ? box.low_x - scale * p.high_x
                           : p.side == left   ? scale * p.low_x - box.high_x
@@ -85,8 +89,10 @@ void BlurredEllipse::evaluate(const Pixels& p, Share& share) const {
     for (const Node* n = &nodes_[kGroup * g]; n != &nodes_[kGroup * g] + kGroup; ++n) {
       const Lanes x = all(n->x) - px, y = all(n->y) - py, xx = x * x, yy = y * y;
       const Lanes ex = exp_of_negative(all(-0.5f) * xx), ey = exp_of_negative(all(-0.5f) * yy), e = ex * ey;
-      if (along_x) w += ey * normal_cdf(all(direction) * x, ex) * all(direction * n->nx);
-      else w += ex * normal_cdf(all(direction) * y, ey) * all(direction * n->ny);
+      if (along_x)
+        w += ey * normal_cdf(all(direction) * x, ex) * all(direction * n->nx);
+      else
+        w += ex * normal_cdf(all(direction) * y, ey) * all(direction * n->ny);
       cx += e * all(n->nx);
       cy += e * all(n->ny);
       r0 += e * all(n->root[0]);

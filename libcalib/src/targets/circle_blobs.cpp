@@ -24,11 +24,11 @@ struct Tiles {
   int columns = 0, rows = 0;
   std::vector<std::uint8_t> low, high;              // of the tile itself
   std::vector<std::uint8_t> near_low, near_high;    // of 3 x 3 tiles
-  std::vector<std::uint8_t> threshold;
+  std::vector<std::uint8_t> threshold, halfway;
 
   explicit Tiles(const GreyLevel& level)
       : columns((level.width + kTile - 1) / kTile), rows((level.height + kTile - 1) / kTile) {
-    for (auto* v : {&low, &high, &near_low, &near_high, &threshold})
+    for (auto* v : {&low, &high, &near_low, &near_high, &threshold, &halfway})
       v->resize(std::size_t(columns) * std::size_t(rows));
   }
   std::size_t at(int column, int row) const { return std::size_t(row) * std::size_t(columns) + std::size_t(column); }
@@ -67,7 +67,8 @@ bool ink_near(const Tiles& ink, int column, int row) {
 }
 
 // The threshold lies three quarters of the way up to the paper: there a small ring, blurred to half of its depth, is still
-// a spot. In sRGB's values that is about halfway in light. It stays clear of the paper's own noise.
+// a spot. In sRGB's values that is about halfway in light. It stays clear of the paper's own noise. Where something brighter
+// than the paper is near, that may be above the paper: hence a second one, halfway.
 // ink: its tiles, or null.
 void choose_thresholds(Tiles& tiles, int row, const std::array<float, 8>& noise, int min_contrast, const Tiles* ink) {
   for (int c = 0; c < tiles.columns; ++c) {
@@ -80,13 +81,14 @@ void choose_thresholds(Tiles& tiles, int row, const std::array<float, 8>& noise,
     const std::size_t i = tiles.at(c, row);
     tiles.near_low[i] = lo;
     tiles.near_high[i] = hi;
-    tiles.threshold[i] = 0;
+    tiles.threshold[i] = tiles.halfway[i] = 0;
     if (ink && !ink_near(*ink, c, row)) continue;
     // Extremes of 576 values of noise lie about 6.2 standard deviations apart.
     const float sigma = noise[std::size_t((lo + hi) / 2 >> 5)], contrast = float(hi - lo);
     if (contrast < float(min_contrast) || contrast < 8 * sigma) continue;
     const float at = std::max(0.5f * contrast, std::min(0.75f * contrast, contrast - 6.5f * noise[std::size_t(hi >> 5)]));
     tiles.threshold[i] = std::uint8_t(float(lo) + at + 0.5f);
+    tiles.halfway[i] = std::uint8_t((lo + hi + 1) / 2);
   }
 }
 
@@ -214,7 +216,8 @@ bool describe(const Component& c, const Extent* extents, double min_minor, Blob&
 }
 
 // Spots whose first row is in [first, last).
-std::vector<Blob> blobs_of_strip(const GreyLevel& level, const Tiles& tiles, int level_index, int first, int last,
+std::vector<Blob> blobs_of_strip(const GreyLevel& level, const Tiles& tiles,
+                                 const std::vector<std::uint8_t>& thresholds, int level_index, int first, int last,
                                  double min_minor) {
   const int from = std::max(0, first - 1), to = std::min(level.height, last + kLargestBlob + 2);
   const int padded = tiles.columns * kTile, words = (padded + 63) / 64;
@@ -228,7 +231,7 @@ std::vector<Blob> blobs_of_strip(const GreyLevel& level, const Tiles& tiles, int
       tile_row = y / kTile;
       any = false;
       for (int c = 0; c < tiles.columns; ++c) {
-        const std::uint8_t t = tiles.threshold[tiles.at(c, tile_row)];
+        const std::uint8_t t = thresholds[tiles.at(c, tile_row)];
         any |= t != 0;
         std::memset(threshold.data() + std::size_t(c) * kTile, t, kTile);
       }
@@ -284,7 +287,7 @@ std::vector<Blob> blobs_of_strip(const GreyLevel& level, const Tiles& tiles, int
     if (c.extents < 0) continue;
     const Run& run = runs.runs[i];
     const std::uint8_t* in = level.row(run.y);
-    const std::uint8_t* t = tiles.threshold.data() + tiles.at(0, run.y / kTile);
+    const std::uint8_t* t = thresholds.data() + tiles.at(0, run.y / kTile);
     Extent& e = extents[std::size_t(c.extents + run.y - c.y0)];
     e.x0 = std::min(e.x0, run.x0 + 0.5 - crossing(in[run.x0], in[run.x0 - 1], t[run.x0 / kTile]));
     e.x1 = std::max(e.x1, run.x1 - 0.5 + crossing(in[run.x1 - 1], in[run.x1], t[(run.x1 - 1) / kTile]));
@@ -382,15 +385,17 @@ std::vector<Blob> find_blobs(const GreyPyramid& grey, const GreyPyramid* ink, co
   for (int l = 0; l < int(grey.size()); ++l)
     for (int y = 0; y < grey[std::size_t(l)].height; y += kStrip)
       strips.push_back({l, y, std::min(y + kStrip, grey[std::size_t(l)].height)});
-  const std::size_t kinds = ink ? 2 : 1;
+  const std::size_t kinds = ink ? 3 : 2;
   std::vector<std::vector<Blob>> found(kinds * strips.size());
   parallel_for(job, found.size(), [&](std::size_t i) {
     const Part& p = strips[i % strips.size()];
     const std::size_t l = std::size_t(p.level);
     const double least = p.level == 0 ? 0.75 * options.min_circle_px
                                       : std::max(kSmallestMinor, 0.75 * std::ldexp(options.min_circle_px, -p.level));
-    found[i] = i < strips.size() ? blobs_of_strip(grey[l], grey_tiles[l], p.level, p.first, p.last, least)
-                                 : blobs_of_strip((*ink)[l], ink_tiles[l], p.level, p.first, p.last, least);
+    const std::size_t kind = i / strips.size();
+    const GreyLevel& level = kind < 2 ? grey[l] : (*ink)[l];
+    const Tiles& tiles = kind < 2 ? grey_tiles[l] : ink_tiles[l];
+    found[i] = blobs_of_strip(level, tiles, kind == 1 ? tiles.halfway : tiles.threshold, p.level, p.first, p.last, least);
   });
   std::vector<Blob> all;
   for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());

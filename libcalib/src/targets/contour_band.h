@@ -85,7 +85,8 @@ void for_each_in_band(const Ellipse& e, const UnitFrame& frame, const BandWidth&
     double middle = 0, half = 0;
     if (!chord(outer_q, dy, middle, half)) continue;
     const auto clamped = [&](double x) { return int(std::clamp<double>(x, box.x0, box.x1)); };
-    const int begin = clamped(std::floor(e.center.x() + middle - half)), end = clamped(e.center.x() + middle + half + 1);
+    const int begin = clamped(std::floor(e.center.x() + middle - half)),
+              end = clamped(e.center.x() + middle + half + 1);
     int hole_begin = end, hole_end = end;
     if (core > 0 && chord(core_q, dy, middle, half)) {
       hole_begin = std::max(begin, clamped(std::ceil(e.center.x() + middle - half)));

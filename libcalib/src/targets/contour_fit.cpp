@@ -11,8 +11,8 @@ namespace lumihull::calib {
 namespace {
 
 constexpr int kSize = ContourModel::kSize;
-// The light's relative change over a pixel, a priori: 10 % over a thousand pixels, with the tails of a Cauchy distribution,
-// so that where the picture shows more it is believed.
+// The light's relative change over a pixel, a priori: 10 % over a thousand pixels, with the tails of a Cauchy
+// distribution, so that where the picture shows more it is believed.
 constexpr double kLightChange = 1e-4;
 constexpr double kRatioSd = 0.03;  // of a ring's ratio, a priori: ink spreads
 constexpr double kLeastRaise = 1.2;  // of the noise: less may be chance
@@ -66,7 +66,8 @@ template <class Body>
 void ContourFit::for_each_residual(const ContourModel& model, Body&& body) {
   share_.set(model.center(), model.root(), model.p[ContourModel::blur], ring_ ? model.p[ContourModel::ratio] : 0);
   BlurredEllipse::Share share;
-  const Lanes gx = all(float(model.p[ContourModel::light_x] / unit_)), gy = all(float(model.p[ContourModel::light_y] / unit_));
+  const Lanes gx = all(float(model.p[ContourModel::light_x] / unit_)),
+              gy = all(float(model.p[ContourModel::light_y] / unit_));
   // The light falls on the print before it is blurred: ∫ f(q) (1 + g·q) G(q - p) dq = (1 + g·p) w + s² g·∇w.
   const Lanes spread = all(float(model.p[ContourModel::blur] * model.p[ContourModel::blur]));
   const Lanes outside = all(float(model.p[ContourModel::outside])), step = all(float(model.p[ContourModel::step]));
@@ -93,7 +94,8 @@ void ContourFit::weigh() {
     for (int i = 0; i < kLanes; ++i) {
       const double v = double(block.expected[i]), variance = std::max(1e-14, scale * plane_.noise.variance(v));
       // By the model, not only by the value: to leave out those that noise has lifted would pull the level down.
-      const bool clipped = block.value[i] >= plane_.saturation || v > double(plane_.saturation) - 2 * std::sqrt(variance);
+      const bool clipped =
+          block.value[i] >= plane_.saturation || v > double(plane_.saturation) - 2 * std::sqrt(variance);
       const bool counts = i < block.count && !clipped && sectors_[block.sector[std::size_t(i)]].used;
       block.variance[i] = float(variance);
       block.weight[i] = counts ? float(1 / variance) : 0.0f;
@@ -132,10 +134,14 @@ double ContourFit::evaluate(const ContourModel& model, double robust, ContourMod
     const Lanes scaled = residual * residual * block.weight, damping = all(1) / (all(1) + limit * scaled);
     sums[kPairs + kSize] += scaled * damping;
     const Lanes weight = block.weight * damping * damping, by_share = step * light;
-    const Lanes slope[kSize] = {by_share * share.by_center[0], by_share * share.by_center[1],
-                                by_share * share.by_root[0],   by_share * share.by_root[1],
-                                by_share * share.by_root[2],   by_share * share.by_s,
-                                light,                         light * share.w,
+    const Lanes slope[kSize] = {by_share * share.by_center[0],
+                                by_share * share.by_center[1],
+                                by_share * share.by_root[0],
+                                by_share * share.by_root[1],
+                                by_share * share.by_root[2],
+                                by_share * share.by_s,
+                                light,
+                                light * share.w,
                                 (plain * block.pixels.x - spread * share.by_center[0]) * per_unit,
                                 (plain * block.pixels.y - spread * share.by_center[1]) * per_unit,
                                 by_share * share.by_ratio};
@@ -153,8 +159,7 @@ double ContourFit::evaluate(const ContourModel& model, double robust, ContourMod
   return squares;
 }
 
-bool ContourFit::solve(ContourModel& model, int max_iterations, double converged, double robust,
-                       double inner_ratio) {
+bool ContourFit::solve(ContourModel& model, int max_iterations, double converged, double robust, double inner_ratio) {
   using Vector = ContourModel::Vector;
   using Matrix = ContourModel::Matrix;
   ring_ = inner_ratio > 0;

@@ -13,8 +13,8 @@
 
 namespace lumihull::calib {
 
-/// Values of an ellipse's picture:  (outside + step · w(p)) (1 + light · p / unit), p from an origin near its centre, and what
-/// blurring makes of the light's change.
+/// Values of an ellipse's picture:  (outside + step · w(p)) (1 + light · p / unit), p from an origin near its centre,
+/// and what blurring makes of the light's change.
 struct ContourModel {
   enum Index { cx, cy, root11, root12, root22, blur, outside, step, light_x, light_y, ratio, kSize };
   using Vector = Eigen::Matrix<double, kSize, 1>;
@@ -50,8 +50,8 @@ class ContourFit {
   void gather(const Ellipse& ellipse, const BandWidth& band, int sectors);
   /// What the model expects of each pixel, for weigh, measure_sectors and robust_scale; solve leaves its answer's.
   void expect(const ContourModel& model, double inner_ratio);
-  /// Weights of the pixels by the expected values; clipped ones (by value or by what is expected) and those of sectors that
-  /// are not used count nothing.
+  /// Weights of the pixels by the expected values; clipped ones (by value or by what is expected) and those of sectors
+  /// that are not used count nothing.
   void weigh();
 
   /// Levenberg-Marquardt. robust > 0: the Geman-McClure loss r² / (1 + r²), r in units of `robust` standard deviations.

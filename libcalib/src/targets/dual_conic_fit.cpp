@@ -18,7 +18,7 @@ using Vector5 = Eigen::Matrix<double, 5, 1>;
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
 using Matrix52 = Eigen::Matrix<double, 5, 2>;
 
-constexpr int kMaxRadius = 15;  // of filters, px: 3 sigma
+constexpr int kMaxRadius = 15;         // of filters, px: 3 sigma
 constexpr double kHighestRatio = 1.8;  // of the band: circles' gaps are as wide as they are, and 0.4 of one is ours
 
 /// A Gaussian and its derivative, as taps -radius … radius for a correlation: a ramp of slope 1 has the derivative 1.
@@ -77,12 +77,15 @@ struct BandPixel {
   }
 };
 
-/// Σ over pixels j of var_j (dΘ/dI_j)(dΘ/dI_j)ᵀ, where dΘ/dI_j = Σ_i by_gradient_i · D_ij over the band's pixels i and D the
-/// filters' taps. Band pixels come row by row, so that 2 radius + 1 rows of sums are enough.
+/// Σ over pixels j of var_j (dΘ/dI_j)(dΘ/dI_j)ᵀ, where dΘ/dI_j = Σ_i by_gradient_i · D_ij over the band's pixels i and
+/// D the filters' taps. Band pixels come row by row, so that 2 radius + 1 rows of sums are enough.
 class NoisePropagation {
  public:
   NoisePropagation(const LightPlane& plane, const Filters& filters, int x0, int x1)
-      : plane_(plane), f_(filters), x0_(x0 - filters.radius), width_(std::size_t(x1 - x0 + 2 * filters.radius)),
+      : plane_(plane),
+        f_(filters),
+        x0_(x0 - filters.radius),
+        width_(std::size_t(x1 - x0 + 2 * filters.radius)),
         rows_(std::size_t(2 * filters.radius + 1), std::vector<Vector5>(width_, Vector5::Zero())) {}
 
   void add(const BandPixel& p, const Matrix52& by_gradient) {
@@ -160,20 +163,23 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
   const UnitFrame frame(guess);
   const double reach = 2 * options.gradient_sigma_px + 1, scale = std::sqrt(guess.a * guess.b);
   const double wall = options.inner_ratio > 0 ? (1 - options.inner_ratio) * guess.b : guess.b;  // to the next contour
-  const BandWidth band{std::min(reach, 0.6 * wall), reach, kHighestRatio};
+  const BandWidth band{std::min(reach, options.inner_ratio > 0 ? 0.6 * wall : wall), reach, kHighestRatio};
 
   std::vector<BandPixel> pixels;
   pixels.reserve(std::size_t(8 * guess.a * (band.inward + band.outward)) + 64);
-  double inside = 0, outside = 0, energy = 0;
-  int n_inside = 0, n_outside = 0, clipped = 0;
+  // Levels are those of the band's outer parts; of a thin ring these may hold no pixel's centre, then all of a side.
+  double inside = 0, outside = 0, any_inside = 0, energy = 0;
+  int n_inside = 0, n_outside = 0, n_any_inside = 0, clipped = 0;
   Matrix5 normal = Matrix5::Zero();
   Vector5 right = Vector5::Zero();
   for_each_in_band(guess, frame, band, box, [&](int x, int y, const Eigen::Vector2d&, double distance) {
     const double value = plane.values.row<float>(y)[x];
     if (value >= double(plane.saturation)) ++clipped;
     if (distance < -0.5 * band.inward) inside += value, ++n_inside;
+    if (distance < 0) any_inside += value, ++n_any_inside;
     if (distance > 0.5 * band.outward) outside += value, ++n_outside;
-    BandPixel p{x, y, (Eigen::Vector2d(x + 0.5, y + 0.5) - guess.center) / scale, gradient(plane.values, filters, x, y)};
+    BandPixel p{x, y, (Eigen::Vector2d(x + 0.5, y + 0.5) - guess.center) / scale,
+                gradient(plane.values, filters, x, y)};
     if (!p.gradient.allFinite()) return;
     double c = 0;
     const Vector5 k = p.monomials(c);
@@ -182,6 +188,7 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
     energy += p.gradient.squaredNorm();
     pixels.push_back(p);
   });
+  if (n_inside == 0) inside = any_inside, n_inside = n_any_inside;
   if (pixels.size() < 12 || n_inside == 0 || n_outside == 0) return fit;
   fit.inside = inside / n_inside;
   fit.outside = outside / n_outside;
@@ -250,7 +257,10 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
 
 EllipseFit dual_conic_fit(const LightPlane& plane, const Ellipse& guess, const EllipseOptions& options) {
   options.validate();
-  return dual_conic_start(plane, guess, options, true);
+  // A band that lies to one side of the contour draws the answer to that side: once more, about the answer.
+  const EllipseFit first = dual_conic_start(plane, guess, options, false);
+  if (first.state != EllipseState::good) return first;
+  return dual_conic_start(plane, first.ellipse, options, true);
 }
 
 }  // namespace lumihull::calib

@@ -17,7 +17,7 @@ namespace {
 constexpr double kHighestRatio = 1.8;  // of the band: gaps between circles are as wide as they are, 0.4 of one is ours
 // Of the step: what lenses' edges differ from a Gaussian's by; RMS over the band, and in a part of it beside the rest.
 constexpr double kTolerance = 0.02, kSectorTolerance = 0.005;
-constexpr double kSectorSigma = 4.5;     // beyond which a part's residuals are no noise
+constexpr double kSectorSigma = 4.5;      // beyond which a part's residuals are no noise
 constexpr double kShiftTolerance = 0.01;  // px that a part may be off: below what such contours are good for
 constexpr double kRobustSigma = 4;
 constexpr double kMostNoise = 0.05;  // of the step: what residuals may pass for noise, whatever the plane says
@@ -77,8 +77,8 @@ bool judge_sectors(std::vector<ContourFit::Sector>& sectors) {
       bad[i] = s.clipped > 0;
       continue;
     }
-    bad[i] = s.squares > common * s.pixels * chi_square_limit(s.pixels, kSectorSigma) ||
-             std::abs(s.shift) > shift_limit;
+    bad[i] =
+        s.squares > common * s.pixels * chi_square_limit(s.pixels, kSectorSigma) || std::abs(s.shift) > shift_limit;
   }
   bool changed = false;
   for (std::size_t i = 0; i < sectors.size(); ++i) {
@@ -189,12 +189,17 @@ EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const Elli
   const double noise =
       pixels.noise_scale() * std::sqrt(std::max(1e-14, plane.noise.variance(0.5 * (fit.inside + fit.outside))));
   const double step = std::abs(model.p[ContourModel::step]), tolerated = kTolerance * step / noise;
-  if (pixels.clipped() > options.max_saturated * pixels.gathered()) fit.state = EllipseState::saturated;
-  else if (step < options.min_contrast_noise * noise) fit.state = EllipseState::no_contrast;
-  else if (fit.visible < options.min_visible) fit.state = EllipseState::occluded;
+  if (pixels.clipped() > options.max_saturated * pixels.gathered())
+    fit.state = EllipseState::saturated;
+  else if (step < options.min_contrast_noise * noise)
+    fit.state = EllipseState::no_contrast;
+  else if (fit.visible < options.min_visible)
+    fit.state = EllipseState::occluded;
   else if (fit.visible < 0.95 ? variance_ratio > 1.4 + 0.25 * tolerated * tolerated  // what is left must be right
-                              : variance_ratio > 2 + tolerated * tolerated) fit.state = EllipseState::no_fit;
-  else fit.state = EllipseState::good;
+                              : variance_ratio > 2 + tolerated * tolerated)
+    fit.state = EllipseState::no_fit;
+  else
+    fit.state = EllipseState::good;
   return fit;
 }
 
@@ -225,7 +230,8 @@ EllipseFit fit_ellipse(const LightPlane& plane, const Ellipse& guess, const Elli
   start.blur_px = std::min(start.blur_px, 1.0);
   EllipseFit again = fit_from(plane, start, options, Effort::careful);
   if (again.state == EllipseState::good && !near_guess(again.ellipse, guess)) again.state = EllipseState::no_fit;
-  const bool better = again.state == EllipseState::good && (fit.state != EllipseState::good || again.visible > fit.visible);
+  const bool better =
+      again.state == EllipseState::good && (fit.state != EllipseState::good || again.visible > fit.visible);
   if (better || !started) fit = again;
   if (fit.state == EllipseState::good || fit.state == EllipseState::no_contrast) return fit;
   const EllipseFit noisier = fit_from(plane, start, options, Effort::noisier);

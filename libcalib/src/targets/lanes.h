@@ -11,7 +11,9 @@ using Lanes = float __attribute__((vector_size(4 * kLanes)));
 using IntLanes = std::int32_t __attribute__((vector_size(4 * kLanes)));
 
 inline Lanes all(float v) { return Lanes{v, v, v, v, v, v, v, v}; }
-inline Lanes chosen(IntLanes where, Lanes yes, Lanes no) { return Lanes((IntLanes(yes) & where) | (IntLanes(no) & ~where)); }
+inline Lanes chosen(IntLanes where, Lanes yes, Lanes no) {
+  return Lanes((IntLanes(yes) & where) | (IntLanes(no) & ~where));
+}
 
 /// exp(x) for x <= 0, to 2e-7 of its value; below -80: about e^-80.
 inline Lanes exp_of_negative(Lanes x) {
@@ -19,7 +21,8 @@ inline Lanes exp_of_negative(Lanes x) {
   // 2^k 2^f, |f| <= 1/2: adding 1.5 · 2^23 rounds to an integer, which then stands in the lowest bits.
   const Lanes y = x * all(1.44269504f), shifted = y + all(12582912.0f);
   const IntLanes k = IntLanes(shifted) - IntLanes(all(12582912.0f));
-  const Lanes f = (x - (shifted - all(12582912.0f)) * all(0.693359375f)) - (shifted - all(12582912.0f)) * all(-2.12194440e-4f);
+  const Lanes f =
+      (x - (shifted - all(12582912.0f)) * all(0.693359375f)) - (shifted - all(12582912.0f)) * all(-2.12194440e-4f);
   Lanes p = all(1.9875691500e-4f);  // Cephes' polynomial for e^f, |f| <= ln 2 / 2
   p = p * f + all(1.3981999507e-3f);
   p = p * f + all(8.3334519073e-3f);

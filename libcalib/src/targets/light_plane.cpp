@@ -93,10 +93,12 @@ LightPlane light_plane(const Image& photo, const Eigen::Vector3f& weights, Job& 
   parallel_chunks(job, std::size_t(photo.height()), kRows, [&](std::size_t first, std::size_t last) {
     for (int y = int(first); y < int(last); ++y) {
       float* out = plane.values.row<float>(y);
-      if (photo.type() == PixelType::u8) look_up_row<std::uint8_t, 256>(photo, y, tables.data(), plane.saturation, out);
+      if (photo.type() == PixelType::u8)
+        look_up_row<std::uint8_t, 256>(photo, y, tables.data(), plane.saturation, out);
       else if (photo.type() == PixelType::u16)
         look_up_row<std::uint16_t, 65536>(photo, y, tables.data(), plane.saturation, out);
-      else convert_row(photo, y, w, plane.saturation, out);
+      else
+        convert_row(photo, y, w, plane.saturation, out);
     }
   });
   const double step = photo.type() == PixelType::u8 ? 1.0 / 255 : photo.type() == PixelType::u16 ? 1.0 / 65535 : 0;

@@ -15,7 +15,7 @@ constexpr int kParameters = 8;  // c0, c1, c2; dark and its slope, light and its
 using Vector = Eigen::Matrix<double, kParameters, 1>;
 using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
 
-constexpr double kLeastBlur = 0.15, kMostBlur = 8;
+constexpr double kLeastBlur = 0.15, kMostBlur = 30;
 constexpr double kFar = 4;  // standard deviations from where on a blurred edge is not felt
 constexpr double kPixelVariance = 1.0 / 12;  // of a pixel's box along a line
 constexpr double kRest = 1e-4;  // px: a step below which the iteration ends (it converges faster than linearly)

@@ -111,6 +111,8 @@ SquareReading read_square(const LightPlane& plane, const Eigen::Matrix3d& pixel_
     for (int y = 0; y < wide; ++y)
       for (int x = 0; x < wide; ++x) {
         const std::size_t i = std::size_t(y * wide + x);
+        const bool paper = x < 1 || y < 1 || x > grid || y > grid;
+        if (paper && std::isnan(seen[i])) continue;  // beyond the picture
         const double off = std::isfinite(seen[i]) ? seen[i] - expected[i] : 1;
         all += off * off;
         const bool data = x > 1 && y > 1 && x < grid && y < grid;

@@ -34,9 +34,13 @@ double decimation(const Image& photo) {
   return megapixels <= 3 ? 1 : std::max(2.0, std::ceil(std::sqrt(megapixels / 6)));
 }
 
+/// Edges that are blurred over many pixels are lost where tiles of a few pixels are judged: a second look, so much coarser.
+constexpr double kCoarser = 4;
+
 struct Candidate {
   SquareQuad quad;
   int design = -1;  ///< < 0: no board has this id
+  double decimate = 1;
 };
 
 struct Answer {
@@ -53,7 +57,7 @@ Eigen::Vector3f linear(const Rgb& c) {
   return {linear_from_srgb(float(c[0]) / 255), linear_from_srgb(float(c[1]) / 255), linear_from_srgb(float(c[2]) / 255)};
 }
 
-Answer measure_candidate(const LightPlane& plane, const TargetSet& set, const Candidate& candidate, double decimate,
+Answer measure_candidate(const LightPlane& plane, const TargetSet& set, const Candidate& candidate,
                          const DetectOptions& options) {
   Answer answer;
   answer.corners = candidate.quad.corners;
@@ -62,7 +66,7 @@ Answer measure_candidate(const LightPlane& plane, const TargetSet& set, const Ca
   const double size = size_of(answer.corners), module = size / (std::sqrt(2.0) * grid);
   const Quad& rough = answer.corners;
   const double bend = curvature_sd(plane.values), sag = bend * size * size / 16;
-  const double reach = std::max(1.5, std::min(0.7 * module, 1 + decimate + sag));
+  const double reach = std::max(1.5, std::min(0.7 * module, 1 + candidate.decimate + sag));
   auto first = measure_square(plane, rough, reach, grid, bend);
   answer.reason = RefusedTarget::Reason::homography;
   if (!first) return answer;
@@ -163,16 +167,19 @@ void SquareDetector::detect(const Image& photo, const DetectOptions& options, Jo
   const bool grey_already = photo.type() == PixelType::u8 && photo.channels() == 1;
   const Image made = grey_already ? Image() : converted(photo, PixelType::u8, 1);
   const Image& grey = grey_already ? photo : made;
-  const double decimate = decimation(photo);
-  job.check();
-
   std::vector<Candidate> candidates;
-  for (SquareQuad& quad : impl_->finder->find(grey, decimate)) {
-    const Quad& c = quad.corners;
-    const double side = std::min({(c[1] - c[0]).norm(), (c[2] - c[1]).norm(), (c[3] - c[2]).norm(), (c[0] - c[3]).norm()});
-    if (side < kLeastSide) continue;
-    const int design = impl_->design_of(quad);
-    candidates.push_back({quad, design});
+  for (const double decimate : {decimation(photo), kCoarser * decimation(photo)}) {
+    job.check();
+    for (const SquareQuad& quad : impl_->finder->find(grey, decimate)) {
+      const Quad& c = quad.corners;
+      const double side =
+          std::min({(c[1] - c[0]).norm(), (c[2] - c[1]).norm(), (c[3] - c[2]).norm(), (c[0] - c[3]).norm()});
+      const bool known = std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& other) {
+        return other.decimate != decimate && other.quad.family == quad.family && other.quad.id == quad.id &&
+               overlap(other.quad.corners, c);
+      });
+      if (side >= kLeastSide && !known) candidates.push_back({quad, impl_->design_of(quad), decimate});
+    }
   }
   // Designs of the same colours share a plane.
   std::vector<std::pair<Eigen::Vector3f, LightPlane>> planes;
@@ -190,7 +197,7 @@ void SquareDetector::detect(const Image& photo, const DetectOptions& options, Jo
   std::vector<Answer> answers(candidates.size());
   parallel_for(job, candidates.size(), [&](std::size_t i) {
     if (candidates[i].design >= 0)
-      answers[i] = measure_candidate(plane_of(candidates[i].design), impl_->set, candidates[i], decimate, options);
+      answers[i] = measure_candidate(plane_of(candidates[i].design), impl_->set, candidates[i], options);
     else
       answers[i].corners = candidates[i].quad.corners, answers[i].reason = RefusedTarget::Reason::unknown_id;
   });

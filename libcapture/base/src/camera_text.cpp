@@ -30,8 +30,8 @@ std::string matrix(const char* name, int rows, int columns, std::initializer_lis
 CameraText opencv_camera(const Camera& camera, const ExportOptions& options) {
   const internal::ForwardRefit refit = internal::simplest_refit(camera, {3, 6}, options.max_refit_error_px, "camera");
   const internal::ForwardCamera& c = refit.camera;
-  std::string text = "%YAML:1.0\n---\nimage_width: " + std::to_string(c.width) +
-                     "\nimage_height: " + std::to_string(c.height) + "\n";
+  std::string text =
+      "%YAML:1.0\n---\nimage_width: " + std::to_string(c.width) + "\nimage_height: " + std::to_string(c.height) + "\n";
   text += matrix("camera_matrix", 3, 3, {c.fx, 0, c.cx - 0.5, 0, c.fy, c.cy - 0.5, 0, 0, 1});
   if (c.k[3] != 0 || c.k[4] != 0 || c.k[5] != 0)
     text += matrix("distortion_coefficients", 8, 1, {c.k[0], c.k[1], c.p1, c.p2, c.k[2], c.k[3], c.k[4], c.k[5]});

@@ -21,8 +21,8 @@ struct Scene {
   Image photo;
 };
 
-Scene scene_of(PointGrid::Kind kind, int columns, int rows, double tilt, double turn, const rig::PrintPhotoOptions& options,
-               std::uint64_t seed) {
+Scene scene_of(PointGrid::Kind kind, int columns, int rows, double tilt, double turn,
+               const rig::PrintPhotoOptions& options, std::uint64_t seed) {
   Scene s;
   s.grid = {.kind = kind, .columns = columns, .rows = rows, .spacing_m = 0.025};
   s.camera = test::wide_camera();
@@ -30,7 +30,8 @@ Scene scene_of(PointGrid::Kind kind, int columns, int rows, double tilt, double 
   const Eigen::Vector3d middle(0.5 * (columns - 1) * 0.025, 0.5 * (rows - 1) * 0.025, 0);
   s.cam_from_grid.rotation = Eigen::AngleAxisd(tilt, Eigen::Vector3d(1, 0.4, 0).normalized()) *
                              Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ());
-  s.cam_from_grid.translation = Eigen::Vector3d(0.01, -0.005, 0.042 * std::max(columns, rows)) - s.cam_from_grid.rotation * middle;
+  s.cam_from_grid.translation =
+      Eigen::Vector3d(0.01, -0.005, 0.042 * std::max(columns, rows)) - s.cam_from_grid.rotation * middle;
   rig::FlatPrint print = rig::print_of(s.grid, {.03f, .03f, .03f}, {.8f, .8f, .8f});
   const View view{s.camera, s.cam_from_grid};
   s.photo = rig::photograph_prints(view, std::span(&print, 1), {.3f, .3f, .3f}, options, seed);
@@ -52,7 +53,8 @@ void expect_measured(const Scene& s, const Detection& found, double rms_limit, d
   const double n = double(view.matches.size());
   EXPECT_LT(std::sqrt(squares / n), rms_limit);
   EXPECT_LT(mahalanobis / n, mahalanobis_limit);
-  if (std::getenv("LUMIHULL_VERBOSE")) std::printf("rms %.4f, Mahalanobis2 %.2f\n", std::sqrt(squares / n), mahalanobis / n);
+  if (std::getenv("LUMIHULL_VERBOSE"))
+    std::printf("rms %.4f, Mahalanobis2 %.2f\n", std::sqrt(squares / n), mahalanobis / n);
 }
 
 TEST(PointGrids, ChessboardCornersToHundredths) {
@@ -98,13 +100,17 @@ TEST(PointGrids, CirclesCalibrateTheCamera) {
   int seed = 0;
   for (const double tilt : {0.5, -0.5, 0.6, -0.4, 0.3})
     for (const double turn : {0.1, 1.4}) {
-      const Scene s = scene_of(PointGrid::Kind::circles, 8, 7, tilt, turn, {.blur_px = 0.8, .noise_read = 0.005}, std::uint64_t(++seed));
+      const Scene s = scene_of(PointGrid::Kind::circles, 8, 7, tilt, turn, {.blur_px = 0.8, .noise_read = 0.005},
+                               std::uint64_t(++seed));
       truth = s.camera;
-      if (const auto found = find_point_grid(s.photo, s.grid, job)) views.push_back(grid_view(s.grid, *found, std::to_string(seed)));
+      if (const auto found = find_point_grid(s.photo, s.grid, job))
+        views.push_back(grid_view(s.grid, *found, std::to_string(seed)));
     }
   ASSERT_GE(views.size(), 8u);
   const LensCalibration found = calibrate_lens(views, truth.width, truth.height, {}, job);
-  if (std::getenv("LUMIHULL_VERBOSE")) std::printf("circles: views %zu rms %.4f sigma0 %.2f f %.3f +- %.3f\n", views.size(), found.rms_px, found.sigma0, found.camera.f, std::sqrt(found.covariance(0, 0)));
+  if (std::getenv("LUMIHULL_VERBOSE"))
+    std::printf("circles: views %zu rms %.4f sigma0 %.2f f %.3f +- %.3f\n", views.size(), found.rms_px, found.sigma0,
+                found.camera.f, std::sqrt(found.covariance(0, 0)));
   EXPECT_LT(found.rms_px, 0.005);
   EXPECT_NEAR(found.sigma0, 1, 0.2);
   EXPECT_LT(std::abs(found.camera.f - truth.f), 5 * std::sqrt(found.covariance(0, 0)));
@@ -122,8 +128,9 @@ TEST(PointGrids, NothingWhereThereIsNone) {
   }
   EXPECT_EQ(test::expect_error([&] { find_point_grid({}, grid, job); }).code(), ErrorCode::invalid_argument);
   const Image photo(30, 30, 1);
-  for (const PointGrid& bad : {PointGrid{.columns = 2, .rows = 6, .spacing_m = 1}, PointGrid{.columns = 9, .rows = 101, .spacing_m = 1},
-                               PointGrid{.columns = 9, .rows = 6, .spacing_m = NAN}})
+  for (const PointGrid& bad :
+       {PointGrid{.columns = 2, .rows = 6, .spacing_m = 1}, PointGrid{.columns = 9, .rows = 101, .spacing_m = 1},
+        PointGrid{.columns = 9, .rows = 6, .spacing_m = NAN}})
     EXPECT_EQ(test::expect_error([&] { find_point_grid(photo, bad, job); }).code(), ErrorCode::invalid_argument);
 }
 

@@ -55,7 +55,8 @@ ChessboardViews chessboard_views(const std::filesystem::path& folder, const std:
     const cv::Mat picture(photo.height(), photo.width(), CV_8UC1, const_cast<std::byte*>(photo.data()));
     std::vector<cv::Point2f> corners;
     if (!found || found->features.size() != 54 || !cv::findChessboardCorners(picture, {9, 6}, corners)) continue;
-    cv::cornerSubPix(picture, corners, {11, 11}, {-1, -1}, {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 100, 1e-4});
+    cv::cornerSubPix(picture, corners, {11, 11}, {-1, -1},
+                     {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 100, 1e-4});
     const auto at = [&](std::size_t i) { return Eigen::Vector2d(corners[i].x + 0.5, corners[i].y + 0.5); };
     if ((at(0) - found->features[0].pixel).norm() > (at(53) - found->features[0].pixel).norm())
       std::reverse(corners.begin(), corners.end());
@@ -84,8 +85,8 @@ OpenCvCalibration opencv_calibration(std::span<const calib::BoardView> views, in
   std::vector<cv::Mat> rotations, translations;
   const auto start = std::chrono::steady_clock::now();
   OpenCvCalibration result;
-  result.rms_px = cv::calibrateCamera(places, pixels, {width, height}, k, lens, rotations, translations, sigmas, ignored,
-                                      errors, free_k3 ? 0 : cv::CALIB_FIX_K3,
+  result.rms_px = cv::calibrateCamera(places, pixels, {width, height}, k, lens, rotations, translations, sigmas,
+                                      ignored, errors, free_k3 ? 0 : cv::CALIB_FIX_K3,
                                       {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-12});
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   result.fx = k.at<double>(0, 0), result.fy = k.at<double>(1, 1);

@@ -15,8 +15,8 @@ std::vector<calib::BoardView> zhang_views(const std::filesystem::path& folder);
 /// Photographs of the 9 x 6 board whose names begin with `side` ("left"), in the order of their names.
 std::vector<std::filesystem::path> chessboard_photos(const std::filesystem::path& folder, const std::string& side);
 
-/// The same board's corners by OpenCV (findChessboardCorners, cornerSubPix) and by find_point_grid, in views whose points
-/// correspond; photographs in which either finds none are left out. Places in fields.
+/// The same board's corners by OpenCV (findChessboardCorners, cornerSubPix) and by find_point_grid, in views whose
+/// points correspond; photographs in which either finds none are left out. Places in fields.
 struct ChessboardViews {
   std::vector<calib::BoardView> opencv, ours;
   int width = 0, height = 0;

@@ -41,8 +41,8 @@ TEST(RealBoards, ZhangsPublishedAnswerInHisModelAndOursIsNoWorse) {
   EXPECT_NEAR(his.v0, 206.585, 0.001);
   EXPECT_NEAR(his.k1, -0.228601, 2e-5);
   EXPECT_NEAR(his.k2, 0.190353, 2e-5);
-  // His polynomial goes from the ray to the picture, ours the other way: with as many parameters they are equal to 1e-4 px.
-  // Ours as it is used, with tangential terms and square pixels, is the better one.
+  // His polynomial goes from the ray to the picture, ours the other way: with as many parameters they are equal to 1e-4
+  // px. Ours as it is used, with tangential terms and square pixels, is the better one.
   EXPECT_NEAR(ours.rms_px, his.rms_px, 1e-4);
   EXPECT_LE(calibrate(views, 640, 480, {f, u0, v0, k1, k2, p1, p2}).rms_px, his.rms_px);
 }
@@ -59,11 +59,17 @@ TEST(RealBoards, ChessboardsAgreeWithOpenCv) {
       for (BoardView& view : same)
         for (BoardMatch& match : view.matches) match.covariance.setIdentity();
       const LensCalibration ours = calibrate(same, views.width, views.height, {f, s, u0, v0, k1, k2, k3, p1, p2});
-      const LensCalibration weighted = calibrate(*corners, views.width, views.height, {f, s, u0, v0, k1, k2, k3, p1, p2});
+      const LensCalibration weighted =
+          calibrate(*corners, views.width, views.height, {f, s, u0, v0, k1, k2, k3, p1, p2});
       const double fx = ours.camera.s * ours.camera.f;
-      if (std::getenv("LUMIHULL_VERBOSE")) std::printf("%s %s corners: %zu views; OpenCV rms %.4f fx %.3f +- %.3f fy %.3f c %.2f %.2f; ours rms %.4f fx %.3f fy %.3f +- %.3f c %.2f %.2f; weighted rms %.4f f %.3f sigma0 %.2f cv %.3f %.2f\n",
-                  side.c_str(), corners == &views.ours ? "our" : "OpenCV's", corners->size(), theirs.rms_px, theirs.fx, theirs.fx_sigma, theirs.fy, theirs.cx, theirs.cy,
-                  ours.rms_px, fx, ours.camera.f, std::sqrt(ours.covariance(0, 0)) * ours.sigma0, ours.camera.u0, ours.camera.v0, weighted.rms_px, weighted.camera.f, weighted.sigma0, weighted.cross_validation_px, weighted.cross_validation_sigma);
+      if (std::getenv("LUMIHULL_VERBOSE"))
+        std::printf(
+            "%s %s corners: %zu views; OpenCV rms %.4f fx %.3f +- %.3f fy %.3f c %.2f %.2f; ours rms %.4f fx %.3f fy "
+            "%.3f +- %.3f c %.2f %.2f; weighted rms %.4f f %.3f sigma0 %.2f cv %.3f %.2f\n",
+            side.c_str(), corners == &views.ours ? "our" : "OpenCV's", corners->size(), theirs.rms_px, theirs.fx,
+            theirs.fx_sigma, theirs.fy, theirs.cx, theirs.cy, ours.rms_px, fx, ours.camera.f,
+            std::sqrt(ours.covariance(0, 0)) * ours.sigma0, ours.camera.u0, ours.camera.v0, weighted.rms_px,
+            weighted.camera.f, weighted.sigma0, weighted.cross_validation_px, weighted.cross_validation_sigma);
       EXPECT_LT(ours.rms_px, 1.005 * theirs.rms_px);
       EXPECT_LT(std::abs(fx - theirs.fx), 2 * theirs.fx_sigma);
     }

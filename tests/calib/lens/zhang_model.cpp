@@ -20,7 +20,8 @@ ZhangModel unpacked(const ZhangModel& base, const VectorXd& p) {
   m.alpha = p(0), m.gamma = p(1), m.beta = p(2), m.u0 = p(3), m.v0 = p(4), m.k1 = p(5), m.k2 = p(6);
   for (std::size_t i = 0; i < m.cam_from_board.size(); ++i) {
     const Eigen::Vector3d w = p.segment<3>(7 + 6 * Eigen::Index(i));
-    const Eigen::Quaterniond turn(Eigen::AngleAxisd(w.norm(), w.norm() > 0 ? w.normalized() : Eigen::Vector3d::UnitX()));
+    const Eigen::Quaterniond turn(
+        Eigen::AngleAxisd(w.norm(), w.norm() > 0 ? w.normalized() : Eigen::Vector3d::UnitX()));
     m.cam_from_board[i] = Pose{turn, p.segment<3>(10 + 6 * Eigen::Index(i))} * m.cam_from_board[i];
   }
   return m;

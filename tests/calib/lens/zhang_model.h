@@ -1,6 +1,7 @@
 #pragma once
 
-// Zhang's own camera model, for comparing with his published answer: skew, and a polynomial from the ray to the picture.
+// Zhang's own camera model, for comparing with his published answer: skew, and a polynomial from the ray to the
+// picture.
 
 #include <lumihull/calib/lens_calibration.h>
 

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 
+#include "decoys.h"
 #include "target_scene.h"
 
 namespace lumihull::calib {
@@ -255,6 +256,38 @@ TEST(Detect, WhitePaperBlackInkAndOtherColours) {
   wall.designs[0].ink = {200, 40, 40};
   wall.designs[0].paper = {90, 190, 90};
   EXPECT_EQ(detect(wall.photo(), set_of(wall.designs)).targets.size(), 1u);
+}
+
+TEST(Detect, ABrightBackground) {
+  Wall wall;
+  for (int i = 0; i < 4; ++i)
+    wall.add(wall.designs[0].family.ids()[std::size_t(30 + i)], Vector2d(160 + 320 * (i % 2), 120 + 240 * (i / 2)), 6 + i, 0.15 * i);
+  EXPECT_EQ(detect(wall.photo({.95f, .95f, .95f}), set_of(wall.designs)).targets.size(), 4u);
+}
+
+TEST(Detect, ThroughDemosaicingAndJpeg) {
+  const TargetSet set = set_of({test::design_of("matrix5x5")});
+  for (const int quality : {95, 85})
+    for (const bool bayer : {false, true})
+      for (const double size : {8.0, 14.0}) {
+        SCOPED_TRACE("quality " + std::to_string(quality) + ", " + std::to_string(size) + " px");
+        rig::PrintPhotoOptions options = usual();
+        options.noise_read = 0.004;
+        options.jpeg_quality = quality;
+        options.bayer = bayer;
+        const auto one = test::one_target(set.designs[0], size, 45 * kDegree, options, 11);
+        EXPECT_EQ(ids_of(detect(one.photo, set)), std::vector<int>{one.target.id});
+      }
+}
+
+TEST(Detect, NothingInClutter) {
+  TargetSet set = set_of({test::design_of("paper4x4"), test::design_of("matrix5x5"), test::design_of("matrix6x6")});
+  DetectOptions options;
+  options.refine = false;
+  const TargetDetector detector(set, options);
+  Job job({}, 2);
+  for (std::uint64_t seed = 0; seed < 8 * test::kDecoyKinds; ++seed)
+    EXPECT_TRUE(detector.detect(test::decoy(seed, 320, 240), job).targets.empty()) << "picture " << seed;
 }
 
 TEST(Detect, SolidLightCircles) {

@@ -74,8 +74,7 @@ std::vector<double> render(const EllipseScene& scene) {
       grid[std::size_t(r) * columns + c] *= 1 + scene.light.dot(p);
     }
   // A sampled Gaussian, then sums over each pixel: along rows, then along columns.
-  const std::vector<double> taps =
-      scene.blur_px > 0 ? gaussian_taps(scene.blur_px * fine) : std::vector<double>{1.0};
+  const std::vector<double> taps = scene.blur_px > 0 ? gaussian_taps(scene.blur_px * fine) : std::vector<double>{1.0};
   const int radius = int(taps.size() / 2);
   // Both at once: weights of the fine cells that a pixel gathers.
   std::vector<double> gather(std::size_t(fine + 2 * radius), 0.0);
@@ -86,8 +85,8 @@ std::vector<double> render(const EllipseScene& scene) {
     for (int x = 0; x < scene.width; ++x) {
       double sum = 0;
       for (int i = 0; i < int(gather.size()); ++i)
-        sum += gather[std::size_t(i)] *
-               grid[std::size_t(r) * columns + std::clamp(x * fine - radius + i, 0, columns - 1)];
+        sum +=
+            gather[std::size_t(i)] * grid[std::size_t(r) * columns + std::clamp(x * fine - radius + i, 0, columns - 1)];
       half[std::size_t(r) * scene.width + x] = sum;
     }
   for (int y = 0; y < scene.height; ++y)

@@ -33,7 +33,8 @@ struct EllipseScene {
   int fine = 8;                 ///< samples a pixel, each way
 };
 
-/// A dark ellipse in the middle of a picture that holds its surroundings, at a phase within a pixel that `random` chooses.
+/// A dark ellipse in the middle of a picture that holds its surroundings, at a phase within a pixel that `random`
+/// chooses.
 EllipseScene scene_of(double minor_px, double aspect, double angle, double blur_px, std::mt19937_64& random);
 /// The same with a light centre.
 void make_ring(EllipseScene& scene, double inner_ratio);

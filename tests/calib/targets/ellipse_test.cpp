@@ -19,7 +19,8 @@ TEST(Ellipse, DualConicHoldsItsTangents) {
   std::uniform_real_distribution<double> part(0, 1);
   for (int i = 0; i < 100; ++i) {
     const double b = 1 + 50 * part(random);
-    const Ellipse e{{1000 * part(random), 700 * part(random)}, b * (1 + 3 * part(random)), b, 3.1 * (part(random) - .5)};
+    const Ellipse e{
+        {1000 * part(random), 700 * part(random)}, b * (1 + 3 * part(random)), b, 3.1 * (part(random) - .5)};
     const Eigen::Matrix3d dual = e.dual_conic();
     for (double t = 0; t < 6; t += 0.7) {
       const Eigen::Vector2d p = e.point(t), ahead = e.point(t + 1e-5) - e.point(t - 1e-5);

@@ -71,8 +71,8 @@ Study study(const Case& c, int phases, int samples, std::uint64_t seed) {
 }
 
 void report(const char* what, const Study& s) {
-  std::printf("%-16s rms %.4f px, %.3f of the bound, mahalanobis² %.2f, residual %.3f, good %d of %d, %.0f us\n", what, s.rms,
-              s.rms / s.bound, s.mahalanobis, s.residual, s.good, s.count, s.us);
+  std::printf("%-16s rms %.4f px, %.3f of the bound, mahalanobis² %.2f, residual %.3f, good %d of %d, %.0f us\n", what,
+              s.rms, s.rms / s.bound, s.mahalanobis, s.residual, s.good, s.count, s.us);
 }
 
 TEST(FitEllipse, ReachesTheBoundAndKnowsItsErrors) {
@@ -102,7 +102,7 @@ TEST(FitEllipse, ReachesTheBoundAndKnowsItsErrors) {
   for (const Row& row : rows) {
     const Study s = study(row.c, row.phases, row.samples, 11);
     report(row.name, s);
-    EXPECT_GE(s.good, 0.995 * s.count) << row.name;
+    EXPECT_GE(s.good, 0.998 * s.count) << row.name;
     EXPECT_LT(s.rms / s.bound, row.most) << row.name;
     EXPECT_GT(s.rms / s.bound, 0.9) << row.name;  // nobody is below the bound
     EXPECT_NEAR(s.mahalanobis, 2, 0.3) << row.name;
@@ -186,8 +186,8 @@ TEST(FitEllipse, HiddenPartsAreLeftOutOrRefused) {
           EllipseScene scene = test::scene_of(minor, i % 2 ? 0.7 : 1, 0.37 * i, 0.8, random);
           const Ellipse& truth = scene.ellipses[0].ellipse;
           scene.bars.push_back({truth.center.x() + truth.b * (1 - hidden), 0, 1000, 1000, value});
-          const EllipseFit fit = fit_ellipse(noisy_plane(scene, render(scene), {64e-6, 0}, random),
-                                             test::rough_guess(truth, random));
+          const EllipseFit fit =
+              fit_ellipse(noisy_plane(scene, render(scene), {64e-6, 0}, random), test::rough_guess(truth, random));
           ++count;
           if (fit.state != EllipseState::good) continue;
           const Eigen::Vector2d error = fit.ellipse.center - truth.center;
@@ -204,6 +204,100 @@ TEST(FitEllipse, HiddenPartsAreLeftOutOrRefused) {
         EXPECT_GT(good, count / 4);
       }
     }
+}
+
+TEST(FitEllipse, NeighboursOfALattice) {
+  // Gaps are as wide as the circles. Half of the neighbours are missing, so that nothing cancels.
+  for (const double minor : {5.0, 8.0, 20.0}) {
+    std::mt19937_64 random(12);
+    double sum = 0;
+    int count = 0, good = 0;
+    for (int phase = 0; phase < 3; ++phase) {
+      EllipseScene scene = test::scene_of(minor, 0.7, 0.7 * phase, minor < 6 ? 0.7 : 1, random);
+      const Ellipse truth = scene.ellipses[0].ellipse;
+      const Eigen::Vector2d right = 4 * (truth.point(0) - truth.center),
+                            down = 4 * (truth.point(1.5707963) - truth.center);
+      for (const Eigen::Vector2d& offset : {right, down, Eigen::Vector2d(right + down)}) {
+        Ellipse other = truth;
+        other.center += offset;
+        scene.ellipses.push_back({other, 0.1});
+      }
+      const std::vector<double> values = render(scene);
+      for (int i = 0; i < 60; ++i) {
+        const EllipseFit fit =
+            fit_ellipse(noisy_plane(scene, values, {64e-6, 0}, random), test::rough_guess(truth, random));
+        ++count;
+        if (fit.state != EllipseState::good) continue;
+        const Eigen::Vector2d error = fit.ellipse.center - truth.center;
+        ++good;
+        sum += error.dot(fit.center_covariance().inverse() * error);
+      }
+    }
+    std::printf("%2.0f px beside others: %d of %d, mahalanobis² %.2f\n", minor, good, count, sum / good);
+    EXPECT_GE(good, 0.98 * count) << minor;
+    EXPECT_LT(sum / good, 2.6) << minor;
+  }
+}
+
+/// One colour a pixel (RGGB), the others from their neighbours' means, 8-bit sRGB.
+Image demosaiced(const EllipseScene& scene, const std::vector<double>& values, double variance,
+                 std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  const int w = scene.width, h = scene.height;
+  std::vector<double> raw(values);
+  for (double& v : raw) v += std::sqrt(variance) * normal(random);
+  const auto color = [](int x, int y) { return y % 2 == 0 ? (x % 2 == 0 ? 0 : 1) : (x % 2 == 0 ? 1 : 2); };
+  Image photo(w, h, 3);
+  for (int y = 0; y < h; ++y)
+    for (int x = 0; x < w; ++x)
+      for (int c = 0; c < 3; ++c) {
+        double sum = 0, weight = 0;
+        for (int dy = -1; dy <= 1; ++dy)
+          for (int dx = -1; dx <= 1; ++dx) {
+            const int u = std::abs(x + dx) < w ? std::abs(x + dx) : w - 2,
+                      v = std::abs(y + dy) < h ? std::abs(y + dy) : h - 2;
+            const double share = color(x, y) == c   ? (dx == 0 && dy == 0)
+                                 : color(u, v) == c ? (2 - std::abs(dx)) * (2 - std::abs(dy))
+                                                    : 0;
+            sum += share * raw[std::size_t(v * w + u)];
+            weight += share;
+          }
+        photo.row<std::uint8_t>(y)[3 * x + c] =
+            std::uint8_t(std::lround(255 * srgb_from_linear(float(std::clamp(sum / weight, 0.0, 1.0)))));
+      }
+  return photo;
+}
+
+TEST(FitEllipse, PhotographsThroughAColourFilter) {
+  // Neighbours' noise is correlated, and the noise is not told but found in the photograph.
+  std::mt19937_64 random(13);
+  double sum = 0, square = 0, bound = 0, residual = 0;
+  int good = 0, count = 0;
+  for (int phase = 0; phase < 6; ++phase) {
+    EllipseScene scene = test::scene_of(14, 0.8, 0.7 * phase, 0.9, random);
+    scene.width = scene.height = 96;
+    scene.fine = 4;
+    scene.ellipses[0].ellipse.center += Eigen::Vector2d(20, 20);
+    const Ellipse& truth = scene.ellipses[0].ellipse;
+    const std::vector<double> values = render(scene);
+    for (int i = 0; i < 40; ++i) {
+      const LightPlane plane = light_plane(demosaiced(scene, values, 1e-4, random));
+      const EllipseFit fit = fit_ellipse(plane, test::rough_guess(truth, random));
+      ++count;
+      if (fit.state != EllipseState::good) continue;
+      const Eigen::Vector2d error = fit.ellipse.center - truth.center;
+      ++good;
+      square += error.squaredNorm();
+      bound += fit.center_covariance().trace();
+      sum += error.dot(fit.center_covariance().inverse() * error);
+      residual += fit.residual;
+    }
+  }
+  std::printf("colour filter: rms %.4f px, expected %.4f, mahalanobis² %.2f, residual %.2f, %d of %d\n",
+              std::sqrt(square / good), std::sqrt(bound / good), sum / good, residual / good, good, count);
+  EXPECT_GE(good, 0.95 * count);
+  EXPECT_GT(sum / good, 1);
+  EXPECT_LT(sum / good, 3);
 }
 
 TEST(FitEllipse, ClippedLight) {
@@ -237,9 +331,9 @@ TEST(FitEllipse, SaysWhyNot) {
   EXPECT_EQ(fit_ellipse(plane, guess).state, EllipseState::at_border);
   EXPECT_EQ(fit_ellipse(noisy_plane(scene, values, {0.06, 0}, random), truth).state, EllipseState::no_contrast);
   const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
-  for (const Ellipse& bad : {Ellipse{}, Ellipse{{nan, 0}, 5, 5, 0}, Ellipse{{15, 15}, inf, 5, 0}, Ellipse{{15, 15}, 5, -5, 0},
-                             Ellipse{{15, 15}, 4, 5, 0}, Ellipse{{15, 15}, 5, 5, nan}, Ellipse{{1e300, 15}, 5, 5, 0},
-                             Ellipse{{15, 15}, 1e6, 1, 0}}) {
+  for (const Ellipse& bad : {Ellipse{}, Ellipse{{nan, 0}, 5, 5, 0}, Ellipse{{15, 15}, inf, 5, 0},
+                             Ellipse{{15, 15}, 5, -5, 0}, Ellipse{{15, 15}, 4, 5, 0}, Ellipse{{15, 15}, 5, 5, nan},
+                             Ellipse{{1e300, 15}, 5, 5, 0}, Ellipse{{15, 15}, 1e6, 1, 0}}) {
     EXPECT_NE(fit_ellipse(plane, bad).state, EllipseState::good);
     EXPECT_NE(dual_conic_fit(plane, bad).state, EllipseState::good);
   }
@@ -265,14 +359,12 @@ TEST(FitEllipse, DoesNotBelieveWhatIsNone) {
       scene.fine = 4;
       scene.blur_px = 0.5 + part(random);
       const double side = 8 + 8 * part(random), x = 24 + part(random), y = 24 + part(random);
-      const auto bar = [&](double x0, double y0, double x1, double y1) {
-        scene.bars.push_back({x0, y0, x1, y1, 0.1});
-      };
+      const auto bar = [&](double x0, double y0, double x1, double y1) { scene.bars.push_back({x0, y0, x1, y1, 0.1}); };
       if (kind == 0) bar(x - side / 2, y - side / 2, x + side / 2, y + side / 2);  // a square
       if (kind == 1) bar(0, 0, x, y), bar(x, y, 48, 48);                           // a chessboard's corner
       if (kind == 2) bar(x - side / 2, 0, x, 48);                                  // a stripe
       if (kind == 3) bar(x - side, y - 2, x + side, y + 2), bar(x - 2, y - side, x + 2, y + side);  // a cross
-      if (kind == 4)  // letters
+      if (kind == 4)                                                                                // letters
         for (int k = 0; k < 12; ++k) {
           const double u = 48 * part(random), v = 48 * part(random);
           bar(u, v, u + 2 + 6 * part(random), v + 1.5 + 4 * part(random));

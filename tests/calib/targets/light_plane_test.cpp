@@ -63,8 +63,9 @@ TEST(LightPlane, ClippedPixelsAreAtSaturation) {
 TEST(LightPlane, NoiseOfFlatPictures) {
   for (const double sigma : {0.003, 0.01, 0.05})
     for (const int channels : {1, 3}) {
-      const LightPlane plane = light_plane(
-          photograph(400, 300, channels, [](int, int) { return 0.5; }, sigma * sigma, 0, 7), {1, 1, 1});
+      const LightPlane plane = light_plane(photograph(
+                                               400, 300, channels, [](int, int) { return 0.5; }, sigma * sigma, 0, 7),
+                                           {1, 1, 1});
       const double expected = std::sqrt((sigma * sigma + 2.3e-6) / channels);
       EXPECT_NEAR(std::sqrt(plane.noise.variance(0.5)) / expected, 1, 0.15) << sigma << " " << channels;
     }
@@ -94,13 +95,15 @@ TEST(LightPlane, NoiseOfPicturesFullOfCircles) {
 }
 
 TEST(LightPlane, RoundingIsTheLeastNoise) {
-  const LightPlane plane = light_plane(photograph(200, 200, 1, [](int, int) { return 0.7; }, 0, 0, 1));
+  const LightPlane plane = light_plane(photograph(
+      200, 200, 1, [](int, int) { return 0.7; }, 0, 0, 1));
   const double step = 2.4 / 1.055 * std::pow(0.7, 1.4 / 2.4) / 255;
   EXPECT_NEAR(std::sqrt(plane.noise.variance(0.7)), step / std::sqrt(12), 0.1 * step);
 }
 
 TEST(LightPlane, DoesNotDependOnThreads) {
-  const Image photo = photograph(300, 300, 3, [](int x, int y) { return 0.2 + 0.001 * x + 0.0005 * y; }, 1e-4, 0, 1);
+  const Image photo = photograph(
+      300, 300, 3, [](int x, int y) { return 0.2 + 0.001 * x + 0.0005 * y; }, 1e-4, 0, 1);
   Job one({}, 1), four({}, 4);
   const LightPlane a = light_plane(photo, {1, 1, 1}, one), b = light_plane(photo, {1, 1, 1}, four);
   EXPECT_EQ(0, std::memcmp(a.values.data(), b.values.data(), a.values.bytes()));

@@ -146,6 +146,15 @@ TEST(SquareTargets, SmallAndSteep) {
   EXPECT_LT(steep.rms(), 0.01);
 }
 
+TEST(SquareTargets, LargeAndOutOfFocus) {
+  for (const double blur : {3., 5.}) {
+    const Study s = study_of({.side = 200, .blur = blur, .noise = 0.01, .most_tilt = 30, .times = 2});
+    EXPECT_EQ(s.found, s.shown) << blur;
+    EXPECT_LT(s.rms(), 0.1) << blur;
+    EXPECT_LT(s.mahalanobis, 6) << blur;  // of 8 corners
+  }
+}
+
 /// A picture with one 60 px target at each of these places.
 Image several(const std::vector<std::pair<int, Eigen::Vector2d>>& targets, int width = 400, int height = 200) {
   const TargetFamily family = TargetFamily::by_name("aruco:6x6_250");

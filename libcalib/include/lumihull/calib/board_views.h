@@ -11,8 +11,9 @@
 namespace lumihull::calib {
 
 /// What was found in one photograph, as calibration takes it: a view for each board of the set, with all of its targets
-/// that were found, named after the photograph ("PHOTO" or, where the photograph shows several, "PHOTO: BOARD"). Where the
-/// set has no boards each target is a body of its own ("PHOTO: FAMILY ID"). Targets that are on no board are left out.
+/// that were found, named after the photograph ("PHOTO" or, where the photograph shows several, "PHOTO: BOARD"). Where
+/// the set has no boards each target is a body of its own ("PHOTO: FAMILY ID"). Targets that are on no board are left
+/// out.
 LUMIHULL_API std::vector<BoardView> board_views(const TargetSet& set, const Detections& found,
                                                 const std::string& photo);
 

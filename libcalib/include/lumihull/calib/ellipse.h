@@ -45,8 +45,10 @@ struct EllipseFit {
   Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
   double inside = 0, outside = 0;  ///< values of the plane on both sides of the contour
   double blur_px = 0;              ///< sigma of the edge's profile
-  double residual = 0;             ///< RMS residual / expected noise: about 1 where the model holds
-  double visible = 1;              ///< part of the contour that was used
+  /// RMS residual / expected noise: about 1 where the model holds, less where neighbouring pixels' noise is correlated
+  /// (demosaicing). fit_ellipse only.
+  double residual = 0;
+  double visible = 1;  ///< part of the contour that was used
 
   Eigen::Matrix2d center_covariance() const { return covariance.topLeftCorner<2, 2>(); }
 };
@@ -69,9 +71,16 @@ struct LUMIHULL_API EllipseOptions {
 LUMIHULL_API EllipseFit dual_conic_fit(const LightPlane& plane, const Ellipse& guess,
                                        const EllipseOptions& options = {});
 
-/// Maximum-likelihood fit of an ellipse with its edge profile (two levels, Gaussian blur, pixel integration) to all
-/// pixels near the contour, weighted by their noise; starts from the dual-conic fit. Reaches the Cramér-Rao bound for
-/// this model. Disturbed parts of the contour are found by their residuals and left out.
+/// Maximum-likelihood fit of an ellipse with its edge profile (two levels, Gaussian blur, pixel integration, light that
+/// changes linearly) to all pixels near the contour, weighted by their noise; starts from the dual-conic fit. Reaches the
+/// Cramér-Rao bound for this model (libcalib/README.md). The blurred ellipse is exact for any curvature; a ring's inner
+/// contour (options.inner_ratio) is part of the model where both are near each other.
+///
+/// The band reaches as far as the edge's profile and the light's levels need, at most to 1.8 times the ellipse: circles may
+/// stand as far apart as they are wide. Parts of the contour whose residuals are more than noise are left out, and `visible`
+/// and the covariance say so; where what is left is too little, or does not look like an ellipse, the state does. The covariance
+/// grows where residuals are larger than the noise explains.
+/// guess: within a tenth of the axes or 1 px, whichever is more. Takes time in proportion to the contour's length.
 LUMIHULL_API EllipseFit fit_ellipse(const LightPlane& plane, const Ellipse& guess, const EllipseOptions& options = {});
 
 }  // namespace lumihull::calib

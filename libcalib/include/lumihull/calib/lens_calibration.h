@@ -52,8 +52,7 @@ struct LUMIHULL_API LensCalibrationOptions {
 struct LensCalibration {
   Camera camera;
   /// Of the ten parameters (zero rows for fixed ones), scaled by sigma0² where that is above 1.
-  Eigen::Matrix<double, kIntrinsics, kIntrinsics> covariance =
-      Eigen::Matrix<double, kIntrinsics, kIntrinsics>::Zero();
+  Eigen::Matrix<double, kIntrinsics, kIntrinsics> covariance = Eigen::Matrix<double, kIntrinsics, kIntrinsics>::Zero();
   std::vector<std::optional<Pose>> cam_from_board;  ///< a view; nullopt: it could not be used
   std::vector<std::string> problems;                ///< of views that could not be used, and weak geometry: what to do
   struct Residual {
@@ -62,33 +61,34 @@ struct LensCalibration {
     bool outlier = false;
   };
   std::vector<Residual> residuals;
-  double rms_px = 0;    ///< sqrt(Σ (dx² + dy²) / points that count)
-  double sigma0 = 0;    ///< residuals over their covariances: about 1
+  double rms_px = 0;  ///< sqrt(Σ (dx² + dy²) / points that count)
+  double sigma0 = 0;  ///< residuals over their covariances: about 1
   /// Views split in two halves, each calibrated alone: largest difference of the two projections over the picture, px,
   /// and that difference over what the covariances expect (about 1). Negative: too few views.
   double cross_validation_px = -1, cross_validation_sigma = -1;
 };
 
-/// Calibrates a camera and its lens from photographs of a body of known points: closed-form start (planes: Zhang 2000; 3-D:
-/// DLT), then minimisation of the reprojection error in pixels (Ceres) over all poses and the free parameters.
+/// Calibrates a camera and its lens from photographs of a body of known points: closed-form start (planes: Zhang 2000;
+/// 3-D: DLT), then minimisation of the reprojection error in pixels (Ceres) over all poses and the free parameters.
 ///
-/// width, height: px of all photographs. Errors: invalid_argument (sizes, not finite), degenerate (too few views or points;
-/// all views parallel: focal length and distance can't be told apart), cancelled.
+/// width, height: px of all photographs. Errors: invalid_argument (sizes, not finite), degenerate (too few views or
+/// points; all views parallel: focal length and distance can't be told apart), cancelled.
 LUMIHULL_API LensCalibration calibrate_lens(std::span<const BoardView> views, int width, int height,
                                             const LensCalibrationOptions& options, Job& job);
 
-/// How uncertain a projection is: the standard deviation (px, the larger axis) of the pixel of a fixed ray at infinity, once
-/// the rotation that best compensates for a change of the intrinsics over the picture is taken off; columns x rows places,
-/// evenly over the picture, row-major.
+/// How uncertain a projection is: the standard deviation (px, the larger axis) of the pixel of a fixed ray at infinity,
+/// once the rotation that best compensates for a change of the intrinsics over the picture is taken off; columns x rows
+/// places, evenly over the picture, row-major.
 LUMIHULL_API std::vector<double> projection_uncertainty(const LensCalibration& calibration, int columns, int rows);
 
-/// A self-contained page: parameters, residuals over the picture, by distance from its middle and by view, the uncertainty of
-/// projections. views: those that were calibrated from. Errors: invalid_argument (other views), bad_input (camera).
+/// A self-contained page: parameters, residuals over the picture, by distance from its middle and by view, the
+/// uncertainty of projections. views: those that were calibrated from. Errors: invalid_argument (other views),
+/// bad_input (camera).
 LUMIHULL_API std::string lens_report_html(const LensCalibration& calibration, std::span<const BoardView> views,
                                           const std::string& title);
 
-/// Text of a file ("lumihull-intrinsics", version 1): camera, covariance, what was measured. Errors: bad_input (a problem's
-/// text is not UTF-8).
+/// Text of a file ("lumihull-intrinsics", version 1): camera, covariance, what was measured. Errors: bad_input (a
+/// problem's text is not UTF-8).
 LUMIHULL_API std::string intrinsics_json(const LensCalibration& calibration);
 /// Writes such a file. Errors: io, bad_input.
 LUMIHULL_API void save_intrinsics(const std::filesystem::path& file, const LensCalibration& calibration);

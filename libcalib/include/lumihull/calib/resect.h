@@ -24,9 +24,9 @@ struct PointMatch {
 
 struct LUMIHULL_API ResectOptions {
   bool robust = true;        ///< points may be wrong: minimal samples find the start, a robust loss weighs
-  double outlier_sigma = 4;  ///< matches farther off than this many standard deviations (2-D) are named outliers
-  int max_iterations = 20;
-  std::uint64_t seed = 1;  ///< of the minimal samples
+  double outlier_sigma = 4;  ///< matches farther off, in standard deviations (2-D), are named outliers; 2 … 100
+  int max_iterations = 20;   ///< of each run of least squares; 1 … 1000
+  std::uint64_t seed = 1;    ///< of the minimal samples
 
   void validate() const;
 };
@@ -56,8 +56,8 @@ struct Resection {
 ///
 /// At least 4 matches at different places, not all on a line. With options.robust matches that don't fit are left out
 /// and named, where at least 5 are given; a match counts as wrong beyond outlier_sigma x the residuals' robust scale.
-/// Errors: invalid_argument (fewer, not finite), degenerate (repeated or collinear points, points behind the camera, a
-/// mirrored world, no pose that the matches agree on). World points in any unit, anywhere.
+/// Errors: bad_input (camera), invalid_argument (fewer, not finite), degenerate (repeated or collinear points, points
+/// behind the camera, a mirrored world, no pose that the matches agree on). World points in any unit, anywhere.
 LUMIHULL_API Resection resect(const Camera& camera, std::span<const PointMatch> matches,
                               const ResectOptions& options = {});
 
