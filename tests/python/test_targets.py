@@ -103,3 +103,48 @@ def test_sheets(tmp_path: Path) -> None:
     with pytest.raises(lumihull.Error):
         lumihull.write_target_sheets(tmp_path / "x", design, [3], formats=["png"])  # type: ignore[list-item]
     assert not (tmp_path / "x.json").exists()
+
+
+def sheet_photo(design: lumihull.TargetDesign, target: int, px_per_m: float = 3000.0) -> np.ndarray:
+    """One target seen straight on, each pixel the mean of 8 x 8 samples: (h, w, 3) uint8."""
+    fine = 8
+    side = round(design.family.grid * design.size_m * px_per_m)
+    y, x = np.mgrid[0 : side * fine, 0 : side * fine] / (fine * px_per_m) + 0.5 / (fine * px_per_m)
+    dark = np.zeros(x.shape)
+    radius = design.circle_diameter_m / 2 if design.circle_diameter_m else design.size_m / 4
+    for (px, py), light in zip(design.features + side / px_per_m / 2, design.family.cells(target).ravel()):
+        r = np.hypot(x - px, y - py) / radius
+        dark[(r <= 1) & ((r >= 0.55) | (light == 0))] = 1
+    ink = dark.reshape(side, fine, side, fine).mean(axis=(1, 3))
+    linear = 0.6 * (1 - ink)[..., None] * [0.5, 1.0, 0.5] + 0.02
+    noise = np.random.default_rng(1).normal(0, 0.004, linear.shape)
+    value = np.clip(linear + noise, 0, 1)
+    srgb = np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
+    return np.round(255 * srgb).astype(np.uint8)
+
+
+def test_a_target_is_found_where_it_is() -> None:
+    design = lumihull.TargetSet.from_word("matrix5x5:20mm").designs[0]
+    photo = sheet_photo(design, 77)
+    detector = lumihull.TargetDetector(lumihull.TargetSet.from_word("matrix5x5:20mm"))
+    found = detector.detect(photo)
+    assert [d.id for d in found.targets] == [77]
+    target = found.targets[0]
+    assert target.indices.tolist() == list(range(25))
+    expected = design.features[target.indices] * 3000 + photo.shape[0] / 2
+    error = target.pixels - expected
+    assert np.abs(error).max() < 0.05
+    squares = np.einsum("ni,nij,nj->n", error, np.linalg.inv(target.covariances), error)
+    assert 0.8 < squares.mean() < 3.5  # ideal: 2
+    assert target.dual_conics.shape == (25, 3, 3)
+    assert target.pixel_from_target.shape == (3, 3)
+    drawn = detector.draw(photo, found)
+    assert drawn.array.shape == photo.shape
+    assert (drawn.array != photo).any()
+
+
+def test_a_detector_says_what_is_wrong() -> None:
+    with pytest.raises(lumihull.Error, match="smallest circle"):
+        lumihull.TargetDetector(lumihull.TargetSet.from_word("matrix5x5:20mm"), min_circle_px=0)
+    empty = lumihull.TargetDetector(lumihull.TargetSet.from_word("matrix5x5:20mm")).detect(np.zeros((1, 1, 3), np.uint8))
+    assert not empty.targets and not empty.refused

@@ -44,7 +44,8 @@ Array<T> of_features(const Detection& d, std::vector<py::ssize_t> shape, Fill fi
 
 template <int Rows, int Columns>
 auto row_major(double* to) {
-  return Eigen::Map<Eigen::Matrix<double, Rows, Columns, Eigen::RowMajor>>(to, Rows, Columns);
+  constexpr int kOrder = Columns == 1 ? Eigen::ColMajor : Eigen::RowMajor;
+  return Eigen::Map<Eigen::Matrix<double, Rows, Columns, kOrder>>(to, Rows, Columns);
 }
 
 }  // namespace
