@@ -227,6 +227,17 @@ LH_API lh_status lh_detections_draw(lh_context *ctx, const lh_detections *detect
                                     const lh_target_detector *detector, const lh_image *photo, double magnify,
                                     lh_image **out);
 
+/** Samples of targets' ink and of what is around it. One thread at a time. */
+typedef struct lh_ink_samples lh_ink_samples;
+LH_API lh_status lh_ink_samples_create(lh_context *ctx, lh_ink_samples **out);
+LH_API void lh_ink_samples_destroy(lh_ink_samples *samples);
+/** From a photograph and what detector found in it without a key. */
+LH_API lh_status lh_ink_samples_add(lh_context *ctx, lh_ink_samples *samples, const lh_image *photo,
+                                    const lh_target_detector *detector, const lh_detections *found);
+/** A key whose foreground is the ink, for lh_detect_options. k: neighbours asked; 0: 7.
+ *  @return LH_EDEGENERATE: fewer than 1000 pixels of ink */
+LH_API lh_status lh_ink_samples_train(lh_context *ctx, const lh_ink_samples *samples, int32_t k, lh_color_key **out);
+
 /* ---- resection --------------------------------------------------------------------------------------------------- */
 
 /** Arrays are borrowed for the call; NULL: the default for all matches. */

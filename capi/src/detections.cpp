@@ -121,3 +121,27 @@ lh_status lh_detections_draw(lh_context* ctx, const lh_detections* detections, c
                                      given(detections, "detections").value, or_default(magnify, 100.0)));
   });
 }
+
+lh_status lh_ink_samples_create(lh_context* ctx, lh_ink_samples** out) {
+  return guarded(ctx, [&] {
+    given(out, "out");
+    give(out);
+  });
+}
+
+void lh_ink_samples_destroy(lh_ink_samples* samples) { delete samples; }
+
+lh_status lh_ink_samples_add(lh_context* ctx, lh_ink_samples* samples, const lh_image* photo,
+                             const lh_target_detector* detector, const lh_detections* found) {
+  return guarded(ctx, [&] {
+    given(samples, "samples")
+        .value.add(given(photo, "photo").value, given(detector, "detector").value.set(), given(found, "found").value);
+  });
+}
+
+lh_status lh_ink_samples_train(lh_context* ctx, const lh_ink_samples* samples, int32_t k, lh_color_key** out) {
+  return guarded(ctx, [&](Job& job) {
+    given(out, "out");
+    give(out, given(samples, "samples").value.train(or_default(int(k), 7), job));
+  });
+}

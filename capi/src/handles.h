@@ -6,8 +6,9 @@
 #include <lumihull/base/image.h>
 #include <lumihull/calib/color_key.h>
 #include <lumihull/calib/detect_targets.h>
-#include <lumihull/calib/target_set.h>
+#include <lumihull/calib/ink_key.h>
 #include <lumihull/calib/lens_calibration.h>
+#include <lumihull/calib/target_set.h>
 #include <lumihull/hull/mesh.h>
 #include <lumihull/hull/ray_scene.h>
 
@@ -49,4 +50,8 @@ struct lh_detections {
 struct lh_lens {
   lumihull::calib::LensCalibration value;
   std::vector<std::size_t> first;  ///< of each view's points, and their number at the end
+};
+
+struct lh_ink_samples {
+  lumihull::calib::InkSamples value;
 };

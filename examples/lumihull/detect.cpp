@@ -3,6 +3,7 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/parallel.h>
 #include <lumihull/calib/detect_targets.h>
+#include <lumihull/calib/ink_key.h>
 
 #include <algorithm>
 #include <array>
@@ -10,6 +11,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <set>
 
 #include "program.h"
@@ -24,7 +26,7 @@ using calib::Detections;
 
 struct Arguments {
   std::vector<std::string> photos;
-  std::string targets, ink_key, draw;
+  std::string targets, ink_key, learn_ink_key, draw;
   double magnify = 100;
 };
 
@@ -109,11 +111,14 @@ void detect(Program& program, const Arguments& a) {
     drawings = drawing_names(a);
   }
 
+  std::optional<calib::InkSamples> ink;
+  if (!a.learn_ink_key.empty()) ink.emplace();
   std::vector<Seen> seen(a.photos.size());
   const auto look = [&](std::size_t i, Job& inner) {
     const Image photo = read_image(a.photos[i]);
     seen[i].width = photo.width(), seen[i].height = photo.height();
     seen[i].found = detector.detect(photo, inner);
+    if (ink) ink->add(photo, detector.set(), seen[i].found);
     if (drawings.empty()) return;
     write_png(drawings[i], draw_detections(photo, detector.set(), seen[i].found, a.magnify));
     seen[i].drawing = drawings[i];
@@ -136,6 +141,11 @@ void detect(Program& program, const Arguments& a) {
     }
   }
   job.end();
+  if (ink) {
+    constexpr int kNeighbours = 7;
+    ink->train(kNeighbours, job).save(a.learn_ink_key);
+    program.say(a.learn_ink_key + ": a key of the ink, from " + std::to_string(ink->ink_pixels()) + " pixels");
+  }
 
   std::size_t targets = 0, features = 0;
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -169,6 +179,9 @@ void add_detect(Program& program) {
                    "aruco:6x6_250:35mm, joined by commas")
       ->required();
   verb->add_option("--ink-key", a->ink_key, "a trained colour key: target ink against everything else");
+  verb->add_option("--learn-ink-key", a->learn_ink_key,
+                   "a file for such a key, learned from the targets that were found: for photographs in which other dark "
+                   "things disturb");
   verb->add_option("--draw", a->draw, "folder for the photographs with what was found drawn in");
   verb->add_option("--magnify", a->magnify, "how much larger residuals are drawn")->check(CLI::Range(0.0, 1e6));
 }

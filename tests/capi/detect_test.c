@@ -31,8 +31,11 @@ int main(int argc, char **argv) {
   lh_context *ctx = lh_context_create();
   lh_target_set *set = NULL;
   lh_target_detector *detector = NULL;
-  lh_image *photo = NULL, *drawn = NULL;
-  lh_detections *found = NULL;
+  static uint8_t rgb[kSize * kSize * 3];
+  lh_image *photo = NULL, *colour = NULL, *drawn = NULL;
+  lh_detections *found = NULL, *again = NULL;
+  lh_ink_samples *samples = NULL;
+  lh_color_key *key = NULL;
   lh_detect_options options;
   lh_detection target;
   lh_refused_target refused;
@@ -77,6 +80,28 @@ int main(int argc, char **argv) {
   CHECK(worst < .05);
   refused.struct_size = sizeof refused;
   EXPECT(ctx, LH_EINVAL, lh_detections_refused(ctx, found, lh_detections_refused_count(found), &refused));
+
+  MUST(ctx, lh_ink_samples_create(ctx, &samples));
+  EXPECT(ctx, LH_EDEGENERATE, lh_ink_samples_train(ctx, samples, 0, &key));
+  CHECK_SAYS(ctx, "ink");
+  EXPECT(ctx, LH_EINVAL, lh_ink_samples_add(ctx, samples, photo, detector, found));
+  CHECK_SAYS(ctx, "colour");
+  for (i = 0; i < sizeof rgb; ++i) rgb[i] = grey[i / 3];
+  MUST(ctx, lh_image_from_array(ctx, rgb, kSize, kSize, 3, LH_PIXEL_U8, 0, &colour));
+  MUST(ctx, lh_ink_samples_add(ctx, samples, colour, detector, found));
+  MUST(ctx, lh_ink_samples_train(ctx, samples, 0, &key));
+  lh_ink_samples_destroy(samples);
+  options.min_circle_px = 0;
+  options.ink_key = key;
+  lh_target_detector_destroy(detector);
+  MUST(ctx, lh_target_detector_create(ctx, set, &options, &detector));
+  lh_color_key_destroy(key);
+  EXPECT(ctx, LH_EINVAL, lh_target_detector_detect(ctx, detector, photo, &again));
+  CHECK_SAYS(ctx, "colour");
+  MUST(ctx, lh_target_detector_detect(ctx, detector, colour, &again));
+  CHECK(lh_detections_count(again) == 1);
+  lh_detections_destroy(again);
+  lh_image_destroy(colour);
 
   MUST(ctx, lh_detections_draw(ctx, found, detector, photo, 0, &drawn));
   CHECK(lh_image_width(drawn) == kSize && lh_image_height(drawn) == kSize && lh_image_channels(drawn) == 3);

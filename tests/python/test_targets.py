@@ -138,6 +138,14 @@ def test_a_target_is_found_where_it_is() -> None:
     assert 0.8 < squares.mean() < 3.5  # ideal: 2
     assert target.dual_conics.shape == (25, 3, 3)
     assert target.pixel_from_target.shape == (3, 3)
+    samples = lumihull.InkSamples()
+    with pytest.raises(lumihull.Error) as caught:
+        samples.train()
+    assert caught.value.code == "degenerate"
+    samples.add(photo, lumihull.TargetSet.from_word("matrix5x5:20mm"), found)
+    assert samples.ink_pixels > 1000
+    keyed = lumihull.TargetDetector(lumihull.TargetSet.from_word("matrix5x5:20mm"), ink_key=samples.train())
+    assert [d.id for d in keyed.detect(photo).targets] == [77]
     drawn = detector.draw(photo, found)
     assert drawn.array.shape == photo.shape
     assert (drawn.array != photo).any()

@@ -21,6 +21,7 @@ from ._lumihull import Detection as Detection
 from ._lumihull import Detections as Detections
 from ._lumihull import Error as Error
 from ._lumihull import Image as Image
+from ._lumihull import InkSamples as InkSamples
 from ._lumihull import LensCalibration as LensCalibration
 from ._lumihull import Mesh as Mesh
 from ._lumihull import MeshCheck as MeshCheck

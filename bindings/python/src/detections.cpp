@@ -1,4 +1,5 @@
 #include <lumihull/calib/detect_targets.h>
+#include <lumihull/calib/ink_key.h>
 #include <pybind11/stl.h>
 
 #include <memory>
@@ -130,6 +131,25 @@ void bind_detections(py::module_& module) {
             return calib::draw_detections(photo, detector.set(), found, magnify);
           },
           "photo"_a, "found"_a, "magnify"_a = 100.0, "The photograph with what was found drawn in.");
+
+  using calib::InkSamples;
+  py::class_<InkSamples>(module, "InkSamples",
+                         "Samples of targets' ink and of what is around it, from photographs in which targets were found.")
+      .def(py::init<>())
+      .def(
+          "add",
+          [](InkSamples& samples, const Image& photo, const TargetSet& targets, const Detections& found) {
+            py::gil_scoped_release without_gil;
+            samples.add(photo, targets, found);
+          },
+          "photo"_a, "targets"_a, "found"_a)
+      .def_property_readonly("ink_pixels", &InkSamples::ink_pixels)
+      .def(
+          "train",
+          [](const InkSamples& samples, int k, unsigned threads) {
+            return work(py::none(), threads, [&](Job& job) { return samples.train(k, job); });
+          },
+          "k"_a = 7, py::kw_only(), "threads"_a = 0, "A ColorKey whose foreground is the ink, for TargetDetector.");
 }
 
 }  // namespace lumihull::python

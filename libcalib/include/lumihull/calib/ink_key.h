@@ -15,7 +15,7 @@ namespace lumihull::calib {
 /// region. `add` may be called by any number of threads; the key does not depend on the order.
 class LUMIHULL_API InkSamples {
  public:
-  /// photo: 1, 3 or 4 channels, sRGB. Ink: pixels well inside of dark circles that were measured. Around: pixels of the
+  /// photo: 3 or 4 channels, sRGB (Error{invalid_argument}: grey). Ink: pixels well inside of dark circles that were measured. Around: pixels of the
   /// paper between the circles, and everything that is a pitch away from all that was found or refused (targets that
   /// were overlooked there are few against the rest). Designs of squares have no ink to learn from: they add nothing.
   void add(const Image& photo, const TargetSet& set, const Detections& found);
