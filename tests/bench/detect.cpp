@@ -157,10 +157,13 @@ void clutters(int pictures, int first, const std::vector<std::string>& files) {
   };
   const double begin = cpu_ms();
   for (int i = first; i < first + pictures; ++i) look(test::decoy(std::uint64_t(i)), "clutter " + std::to_string(i));
-  for (const std::string& file : files) look(read_image(file, {.apply_orientation = false, .channels = 3, .max_file_bytes = 1u << 30}), file);
-  std::printf("%d pictures of clutter, %zu photographs: %d false targets; refused: %d no code, %d homography, %d too few\n",
-              pictures, files.size(), found, refused[0], refused[1], refused[3]);
-  std::printf("%.1f ms cpu a picture, drawing included\n", (cpu_ms() - begin) / std::max<double>(1, pictures + double(files.size())));
+  for (const std::string& file : files)
+    look(read_image(file, {.apply_orientation = false, .channels = 3, .max_file_bytes = 1u << 30}), file);
+  std::printf(
+      "%d pictures of clutter, %zu photographs: %d false targets; refused: %d no code, %d homography, %d too few\n",
+      pictures, files.size(), found, refused[0], refused[1], refused[3]);
+  std::printf("%.1f ms cpu a picture, drawing included\n",
+              (cpu_ms() - begin) / std::max<double>(1, pictures + double(files.size())));
 }
 
 // Renders over the goal's range: rate of detection and wrong ids.
@@ -186,11 +189,12 @@ void ids(const std::string& family, int renders, int first) {
       corrected += t.corrected;
       if (t.id == one.target.id) continue;
       ++wrong;
-      std::printf("  WRONG: render %d: id %d for %d, corrected %d, erased %d\n", i, t.id, one.target.id, t.corrected, t.erased);
+      std::printf("  WRONG: render %d: id %d for %d, corrected %d, erased %d\n", i, t.id, one.target.id, t.corrected,
+                  t.erased);
     }
   }
-  std::printf("%s: %d renders: found %.3f %%, wrong ids %d, corrected cells %d\n", family.c_str(), renders, 100.0 * found / renders,
-              wrong, corrected);
+  std::printf("%s: %d renders: found %.3f %%, wrong ids %d, corrected cells %d\n", family.c_str(), renders,
+              100.0 * found / renders, wrong, corrected);
 }
 
 }  // namespace
@@ -202,6 +206,7 @@ int main(int argc, char** argv) {
   if (what == "clutter")
     clutters(argc > 2 ? std::atoi(argv[2]) : 1000, argc > 3 ? std::atoi(argv[3]) : 0,
              std::vector<std::string>(argv + std::min(argc, 4), argv + argc));
-  if (what == "ids") ids(argc > 2 ? argv[2] : "matrix5x5", argc > 3 ? std::atoi(argv[3]) : 1000, argc > 4 ? std::atoi(argv[4]) : 0);
+  if (what == "ids")
+    ids(argc > 2 ? argv[2] : "matrix5x5", argc > 3 ? std::atoi(argv[3]) : 1000, argc > 4 ? std::atoi(argv[4]) : 0);
   return 0;
 }

@@ -15,15 +15,15 @@ namespace lumihull::calib {
 namespace {
 
 constexpr int kTile = 8;
-constexpr int kLargestBlob = 40;  // longest side of a spot's box, px of its level
-constexpr int kStrip = 256;       // rows that a thread takes at a time
+constexpr int kLargestBlob = 40;      // longest side of a spot's box, px of its level
+constexpr int kStrip = 256;           // rows that a thread takes at a time
 constexpr double kSmallestMinor = 5;  // px of the level: above level 0, where smaller spots are for the level below
 
 // Extremes of tiles, and from them the threshold of each tile: 0 where there is nothing to see.
 struct Tiles {
   int columns = 0, rows = 0;
-  std::vector<std::uint8_t> low, high;              // of the tile itself
-  std::vector<std::uint8_t> near_low, near_high;    // of 3 x 3 tiles
+  std::vector<std::uint8_t> low, high;            // of the tile itself
+  std::vector<std::uint8_t> near_low, near_high;  // of 3 x 3 tiles
   std::vector<std::uint8_t> threshold, halfway;
 
   explicit Tiles(const GreyLevel& level)
@@ -56,8 +56,8 @@ void extremes(const GreyLevel& level, Tiles& tiles, int row) {
   }
 }
 
-// Whether there is ink within three tiles. A ring whose wall is too thin to hold any is no larger than 9 px or so, and the
-// L, which does, is seldom more than a pitch away.
+// Whether there is ink within three tiles. A ring whose wall is too thin to hold any is no larger than 9 px or so, and
+// the L, which does, is seldom more than a pitch away.
 bool ink_near(const Tiles& ink, int column, int row) {
   constexpr int kReach = 3;
   for (int r = std::max(0, row - kReach); r <= std::min(ink.rows - 1, row + kReach); ++r)
@@ -66,10 +66,10 @@ bool ink_near(const Tiles& ink, int column, int row) {
   return false;
 }
 
-// The threshold lies three quarters of the way up to the paper: there a small ring, blurred to half of its depth, is still
-// a spot. In sRGB's values that is about halfway in light. It stays clear of the paper's own noise. Where something brighter
-// than the paper is near, that may be above the paper: hence a second one, halfway.
-// ink: its tiles, or null.
+// The threshold lies three quarters of the way up to the paper: there a small ring, blurred to half of its depth, is
+// still a spot. In sRGB's values that is about halfway in light. It stays clear of the paper's own noise. Where
+// something brighter than the paper is near, that may be above the paper: hence a second one, halfway. ink: its tiles,
+// or null.
 void choose_thresholds(Tiles& tiles, int row, const std::array<float, 8>& noise, int min_contrast, const Tiles* ink) {
   for (int c = 0; c < tiles.columns; ++c) {
     std::uint8_t lo = 255, hi = 0;
@@ -86,7 +86,8 @@ void choose_thresholds(Tiles& tiles, int row, const std::array<float, 8>& noise,
     // Extremes of 576 values of noise lie about 6.2 standard deviations apart.
     const float sigma = noise[std::size_t((lo + hi) / 2 >> 5)], contrast = float(hi - lo);
     if (contrast < float(min_contrast) || contrast < 8 * sigma) continue;
-    const float at = std::max(0.5f * contrast, std::min(0.75f * contrast, contrast - 6.5f * noise[std::size_t(hi >> 5)]));
+    const float at =
+        std::max(0.5f * contrast, std::min(0.75f * contrast, contrast - 6.5f * noise[std::size_t(hi >> 5)]));
     tiles.threshold[i] = std::uint8_t(float(lo) + at + 0.5f);
     tiles.halfway[i] = std::uint8_t((lo + hi + 1) / 2);
   }
@@ -325,8 +326,7 @@ std::vector<Blob> without_repeats(std::vector<Blob> blobs, int width, int height
         for (int i = head[std::size_t(y) * std::size_t(columns) + std::size_t(x)]; i >= 0; i = next[std::size_t(i)]) {
           const Blob& other = kept[std::size_t(i)];
           const double ratio = blob.a * blob.b / (other.a * other.b);
-          if ((blob.center - other.center).norm() < 0.3 * std::min(blob.b, other.b) + 0.5 && ratio < 3 &&
-              ratio > 0.3) {
+          if ((blob.center - other.center).norm() < 0.3 * std::min(blob.b, other.b) + 0.5 && ratio < 3 && ratio > 0.3) {
             repeated = true;
             break;
           }
@@ -395,7 +395,8 @@ std::vector<Blob> find_blobs(const GreyPyramid& grey, const GreyPyramid* ink, co
     const std::size_t kind = i / strips.size();
     const GreyLevel& level = kind < 2 ? grey[l] : (*ink)[l];
     const Tiles& tiles = kind < 2 ? grey_tiles[l] : ink_tiles[l];
-    found[i] = blobs_of_strip(level, tiles, kind == 1 ? tiles.halfway : tiles.threshold, p.level, p.first, p.last, least);
+    found[i] =
+        blobs_of_strip(level, tiles, kind == 1 ? tiles.halfway : tiles.threshold, p.level, p.first, p.last, least);
   });
   std::vector<Blob> all;
   for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());

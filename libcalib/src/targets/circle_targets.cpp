@@ -158,8 +158,8 @@ Matrix3d circle_homography(std::span<const Vector2d> plane, double radius, std::
     // The sign of a homography is free; the predictions need the plane in front.
     if ((h * Vector3d(plane[0].x(), plane[0].y(), 1)).z() < 0) h = -h;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
-      const Vector2d offset = homography_circle_center(h, plane[i], radius) -
-                              (h * Vector3d(plane[i].x(), plane[i].y(), 1)).hnormalized();
+      const Vector2d offset =
+          homography_circle_center(h, plane[i], radius) - (h * Vector3d(plane[i].x(), plane[i].y(), 1)).hnormalized();
       centers[i] = pixels[i] - (offset.allFinite() ? offset : Vector2d(0, 0));
     }
     h = find_homography(plane, centers);
@@ -306,9 +306,10 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   const CircleLook look = look_of(design);
   const CellReading first = read_cells(plane, circles, states, grid, 2 * grid - 1, look);
   Contours contours = measure(plane, {0, 0}, circles, states, first, look, options);
-  // Where a third of the contours look disturbed, it is not a hand: JPEG's and demosaicing's errors stand at edges, and the
-  // noise of smooth places does not tell of them. Then the noise is what makes the contours agree.
-  for (double factor = 3; 10 * contours.good < 8 * int(n) && 3 * contours.disturbed > int(n) && factor < 10; factor *= 3) {
+  // Where a third of the contours look disturbed, it is not a hand: JPEG's and demosaicing's errors stand at edges, and
+  // the noise of smooth places does not tell of them. Then the noise is what makes the contours agree.
+  for (double factor = 3; 10 * contours.good < 8 * int(n) && 3 * contours.disturbed > int(n) && factor < 10;
+       factor *= 3) {
     Eigen::Vector2i corner;
     LightPlane part = part_of(plane, circles, states, corner);
     part.noise.read *= factor * factor, part.noise.gain *= factor * factor;
@@ -334,6 +335,22 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   const std::optional<DecodedTarget> decoded = design.family.decode(reading.cells, options.correct);
   if (!decoded) return refuse(RefusedTarget::Reason::no_code);
   result.refused.id = decoded->id;
+  // Where this circle of the window stands in an upright target.
+  const auto upright = [&](std::size_t i) {
+    int row = int(i) / grid, column = int(i) % grid;
+    for (int q = 0; q < decoded->quarter_turns; ++q) {
+      const int r = row;
+      row = column, column = grid - 1 - r;
+    }
+    return row * grid + column;
+  };
+  // A perforated sheet that lacks some holes is dark wherever it can be read: most light circles must have been seen.
+  const std::vector<Cell> printed_cells = design.family.cells(decoded->id);
+  int light_seen = 0, light_missed = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    if (printed_cells[std::size_t(upright(i))] == Cell::light)
+      ++(reading.cells[i] == Cell::light ? light_seen : light_missed);
+  if (light_seen <= light_missed) return refuse(RefusedTarget::Reason::no_code);
 
   // The board that has this id says which of several designs of the family it is.
   int design_index = -1;
@@ -360,13 +377,8 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   std::vector<Feature> features;
   for (std::size_t i = 0; i < n; ++i) {
     if (states[i] != EllipseState::good) continue;
-    int row = int(i) / grid, column = int(i) % grid;
-    for (int q = 0; q < decoded->quarter_turns; ++q) {
-      const int r = row;
-      row = column, column = grid - 1 - r;
-    }
     Feature f;
-    f.index = row * grid + column;
+    f.index = upright(i);
     f.pixel = fits[i].ellipse.center;
     f.covariance = fits[i].center_covariance();
     f.dual_conic = fits[i].ellipse.dual_conic();

@@ -35,9 +35,9 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
 /// Ellipse of a blob.
 Ellipse ellipse_of(const Blob& blob);
 
-/// Pixel from plane (n points; circles of `radius` about them) such that predicted ellipse centres meet the measured ones,
-/// in least squares of pixels. Three rounds: each takes the offset between ellipse's and circle's centre from the last.
-/// Error{degenerate} as find_homography.
+/// Pixel from plane (n points; circles of `radius` about them) such that predicted ellipse centres meet the measured
+/// ones, in least squares of pixels. Three rounds: each takes the offset between ellipse's and circle's centre from the
+/// last. Error{degenerate} as find_homography.
 Eigen::Matrix3d circle_homography(std::span<const Eigen::Vector2d> plane, double radius,
                                   std::span<const Eigen::Vector2d> pixels);
 

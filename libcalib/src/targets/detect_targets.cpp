@@ -22,7 +22,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3f;
 
 Vector3f linear_color(const Rgb& c) {
-  return {linear_from_srgb(float(c[0]) / 255), linear_from_srgb(float(c[1]) / 255), linear_from_srgb(float(c[2]) / 255)};
+  return {linear_from_srgb(float(c[0]) / 255), linear_from_srgb(float(c[1]) / 255),
+          linear_from_srgb(float(c[2]) / 255)};
 }
 
 // Designs that are looked for on one plane of the photograph, with one pitch in radii of their circles.
@@ -120,7 +121,9 @@ void resolve(const TargetSet& set, std::vector<WindowResult>& results) {
 }  // namespace
 
 void DetectOptions::validate() const {
-  const auto refuse = [](const char* message) { throw Error(ErrorCode::invalid_argument, message, "target detection"); };
+  const auto refuse = [](const char* message) {
+    throw Error(ErrorCode::invalid_argument, message, "target detection");
+  };
   if (!(min_circle_px >= 3 && min_circle_px < 1e5)) refuse("smallest circle: expected 3 px or more");
   if (!(correct >= 0 && correct <= 1)) refuse("correction: expected 0 to 1");
   ellipse.validate();
@@ -151,7 +154,8 @@ void TargetDetector::Impl::find_circles(const Image& photo, Job& job, Detections
   Image storage;
   const Image& bytes = eight_bit(photo, storage);
   if (options.ink_key && bytes.channels() != 3)
-    throw Error(ErrorCode::invalid_argument, "a key for ink needs a colour photograph (3 channels)", "target detection");
+    throw Error(ErrorCode::invalid_argument, "a key for ink needs a colour photograph (3 channels)",
+                "target detection");
   std::vector<WindowResult> results;
   std::vector<Blob> blobs;
   GreyPyramid ink;
@@ -181,9 +185,8 @@ void TargetDetector::Impl::find_circles(const Image& photo, Job& job, Detections
       for (const Window& w : list) windows.push_back(&w);
     const std::size_t before = results.size();
     results.resize(before + windows.size());
-    parallel_for(job, windows.size(), [&](std::size_t i) {
-      results[before + i] = read_window(plane, blobs, *windows[i], set, options);
-    });
+    parallel_for(job, windows.size(),
+                 [&](std::size_t i) { results[before + i] = read_window(plane, blobs, *windows[i], set, options); });
   }
   resolve(set, results);
   for (WindowResult& r : results) {

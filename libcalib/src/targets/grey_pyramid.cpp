@@ -157,7 +157,8 @@ std::array<float, 8> grey_noise(const GreyLevel& level) {
   }
   // Edges take part where a range has no smooth places: noise grows towards the dark as sRGB's slope does, not faster.
   for (int b = kBins - 2; b >= 0; --b)
-    if (sigma[std::size_t(b) + 1] > 0) sigma[std::size_t(b)] = std::min(sigma[std::size_t(b)], 2 * sigma[std::size_t(b) + 1]);
+    if (sigma[std::size_t(b) + 1] > 0)
+      sigma[std::size_t(b)] = std::min(sigma[std::size_t(b)], 2 * sigma[std::size_t(b) + 1]);
   return sigma;
 }
 

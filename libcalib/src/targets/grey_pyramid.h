@@ -14,7 +14,7 @@ namespace lumihull::calib {
 /// their order and rough differences matter here; contours are measured elsewhere, in linear light.
 struct GreyLevel {
   int width = 0, height = 0;
-  std::vector<std::uint8_t> pixels;         ///< empty where `borrowed` is set
+  std::vector<std::uint8_t> pixels;        ///< empty where `borrowed` is set
   const std::uint8_t* borrowed = nullptr;  ///< a grey photograph's own pixels
 
   const std::uint8_t* row(int y) const {
@@ -26,8 +26,8 @@ struct GreyLevel {
 /// the last one whose sides are at least 16 px.
 using GreyPyramid = std::vector<GreyLevel>;
 
-/// The photograph as 8 bits, 1 or 3 channels; `photo` itself where it is so already (then `storage` stays empty). Values
-/// that are no numbers count as 0.
+/// The photograph as 8 bits, 1 or 3 channels; `photo` itself where it is so already (then `storage` stays empty).
+/// Values that are no numbers count as 0.
 const Image& eight_bit(const Image& photo, Image& storage);
 
 /// Σ weights · (red, green, blue), |weights| scaled to sum 1 and shifted so that black to white fits into 0 … 255; grey

@@ -17,7 +17,8 @@ using Eigen::Vector2d;
 std::optional<double> sample(const Image& values, const Vector2d& p) {
   const double x = p.x() - 0.5, y = p.y() - 0.5;
   if (!(x >= 0 && y >= 0 && x <= values.width() - 1 && y <= values.height() - 1)) return std::nullopt;
-  const int x0 = std::min(int(x), std::max(0, values.width() - 2)), y0 = std::min(int(y), std::max(0, values.height() - 2));
+  const int x0 = std::min(int(x), std::max(0, values.width() - 2)),
+            y0 = std::min(int(y), std::max(0, values.height() - 2));
   const int x1 = std::min(x0 + 1, values.width() - 1), y1 = std::min(y0 + 1, values.height() - 1);
   const double fx = x - x0, fy = y - y0;
   const float *a = values.row<float>(y0), *b = values.row<float>(y1);
@@ -155,7 +156,8 @@ CellReading read_cells(const LightPlane& plane, std::span<const Ellipse> circles
     if (!look.solid_light) {
       // Averaging is a blur, too: the places' variance along an axis is about a third of the radius squared.
       const double a = circles[i].a, b = circles[i].b, averaged = 0.29 * within * within;
-      const double sx = std::sqrt(sigma * sigma / (a * a) + averaged), sy = std::sqrt(sigma * sigma / (b * b) + averaged);
+      const double sx = std::sqrt(sigma * sigma / (a * a) + averaged),
+                   sy = std::sqrt(sigma * sigma / (b * b) + averaged);
       const double disc = inside_unit_circle(sx, sy);
       const double hole = inside_unit_circle(sx / look.ring_ratio, sy / look.ring_ratio);
       light = 1 - hole / disc;

@@ -18,18 +18,20 @@ struct CircleLook {
 /// What the cells of a grid are, and how well they tell themselves apart.
 struct CellReading {
   std::vector<Cell> cells;  ///< columns x rows, row-major
-  double separation = 0;    ///< expected difference between a dark and a light centre, of the paper's light; 0: unreadable
-  double blur_px = 0;       ///< sigma that was assumed
-  double dark_spread = 0;   ///< standard deviation of dark circles' centres / the ink's contrast
-  double contrast = 0;      ///< of dark circles' centres, of the paper's light
+  double separation =
+      0;               ///< expected difference between a dark and a light centre, of the paper's light; 0: unreadable
+  double blur_px = 0;  ///< sigma that was assumed
+  double dark_spread = 0;  ///< standard deviation of dark circles' centres / the ink's contrast
+  double contrast = 0;     ///< of dark circles' centres, of the paper's light
 };
 
 /// Reads a grid of circles by the light in their centres. circles: columns x rows, row-major, measured or predicted;
-/// states: circles that are not `good` (hidden, say) are unknown. certainly_dark: how many circles are dark in any case.
+/// states: circles that are not `good` (hidden, say) are unknown. certainly_dark: how many circles are dark in any
+/// case.
 ///
-/// Light is counted relative to the paper between the circles, so that shading drops out. How light the centre of a ring
-/// becomes depends on blur: with s = sigma / semi-axes, a disc of light keeps P(|N(0, s²)| < 1) of its contrast at its
-/// centre; dark and light centres are told apart halfway between what both should be, the zone between is unknown.
+/// Light is counted relative to the paper between the circles, so that shading drops out. How light the centre of a
+/// ring becomes depends on blur: with s = sigma / semi-axes, a disc of light keeps P(|N(0, s²)| < 1) of its contrast at
+/// its centre; dark and light centres are told apart halfway between what both should be, the zone between is unknown.
 CellReading read_cells(const LightPlane& plane, std::span<const Ellipse> circles, std::span<const EllipseState> states,
                        int columns, int certainly_dark, const CircleLook& look);
 

@@ -60,7 +60,8 @@ struct Canvas {
     const int reach = int(std::ceil(3 * sigma));
     std::vector<float> kernel;
     float sum = 0;
-    for (int i = -reach; i <= reach; ++i) kernel.push_back(float(std::exp(-0.5 * i * i / (sigma * sigma)))), sum += kernel.back();
+    for (int i = -reach; i <= reach; ++i)
+      kernel.push_back(float(std::exp(-0.5 * i * i / (sigma * sigma)))), sum += kernel.back();
     std::vector<float> out(values.size());
     for (int pass = 0; pass < 2; ++pass) {
       for (int y = 0; y < height; ++y)
@@ -99,7 +100,8 @@ Perspective some_perspective(Random& random, const Canvas& canvas, double pitch)
   Perspective p;
   p.middle = {canvas.width * random.uniform(.15, .85), canvas.height * random.uniform(.15, .85)};
   const double tilt = random.uniform(0, 1.1);
-  p.axes = pitch * turned(random.uniform(0, 6.3), 1, std::cos(tilt)) * Eigen::Rotation2Dd(random.uniform(0, 6.3)).toRotationMatrix();
+  p.axes = pitch * turned(random.uniform(0, 6.3), 1, std::cos(tilt)) *
+           Eigen::Rotation2Dd(random.uniform(0, 6.3)).toRotationMatrix();
   p.pull = Vector2d(random.uniform(-1, 1), random.uniform(-1, 1)) * 0.03 * std::sin(tilt);
   return p;
 }
@@ -122,10 +124,12 @@ void text(Canvas& canvas, Random& random, float ink) {
           canvas.shape(q, axes, 2, ink);
           canvas.shape(q, axes * 0.6, 2, canvas.values[0]);
         } else {
-          canvas.shape(q, turned(angle + (random.below(2) ? 0 : 1.57) + random.uniform(-.3, .3), .4 * size, thick), 8, ink);
+          canvas.shape(q, turned(angle + (random.below(2) ? 0 : 1.57) + random.uniform(-.3, .3), .4 * size, thick), 8,
+                       ink);
         }
       }
-      if (random.below(6) == 0) canvas.shape(p + turn * Vector2d(.3 * size, .45 * size), turned(0, .08 * size, .08 * size), 2, ink);
+      if (random.below(6) == 0)
+        canvas.shape(p + turn * Vector2d(.3 * size, .45 * size), turned(0, .08 * size, .08 * size), 2, ink);
     }
 }
 
@@ -148,7 +152,8 @@ Image decoy(std::uint64_t seed, int width, int height) {
     for (int i = 0; i < n; ++i) {
       const double a = size * random.uniform(.5, 1.5), b = a * random.uniform(kind == 1 ? .5 : .2, 1);
       const float value = kind == 1 ? ink : float(random.uniform(.02, .8));
-      canvas.shape({random.uniform(0, width), random.uniform(0, height)}, turned(random.uniform(0, 6.3), a, b), 2, value);
+      canvas.shape({random.uniform(0, width), random.uniform(0, height)}, turned(random.uniform(0, 6.3), a, b), 2,
+                   value);
     }
   } else if (kind == 3) {
     text(canvas, random, ink);
@@ -168,7 +173,8 @@ Image decoy(std::uint64_t seed, int width, int height) {
       const Perspective grid = some_perspective(random, canvas, random.uniform(8, 26));
       const int columns = block == 0 ? 4 + random.below(3) : 3 + random.below(10);
       const int rows = block == 0 ? columns : 3 + random.below(10);
-      const double r = random.uniform(.2, .3), missing = random.below(3) == 0 ? .1 : 0, ring = random.below(4) == 0 ? .55 : 0;
+      const double r = random.uniform(.2, .3), missing = random.below(3) == 0 ? .1 : 0,
+                   ring = random.below(4) == 0 ? .55 : 0;
       for (int u = 0; u < columns; ++u)
         for (int v = 0; v < rows; ++v) {
           if (random.uniform(0, 1) < missing) continue;
@@ -187,9 +193,10 @@ Image decoy(std::uint64_t seed, int width, int height) {
         canvas.shape(grid.at(cu, v), cap * grid.frame(cu, v), power, ink);
         const int marks = random.below(3);
         for (int m = 0; m < marks; ++m)
-          canvas.shape(grid.at(cu + random.uniform(-.1, .1), v + random.uniform(-.1, .1)),
-                       grid.frame(cu, v) * turned(random.uniform(0, 3), random.uniform(.03, .18), random.uniform(.03, .1)), 3,
-                       paper);
+          canvas.shape(
+              grid.at(cu + random.uniform(-.1, .1), v + random.uniform(-.1, .1)),
+              grid.frame(cu, v) * turned(random.uniform(0, 3), random.uniform(.03, .18), random.uniform(.03, .1)), 3,
+              paper);
       }
   } else {  // nested shapes: rings, eyes, washers
     for (int i = 0; i < 60; ++i) {
@@ -205,7 +212,8 @@ Image decoy(std::uint64_t seed, int width, int height) {
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
       for (int c = 0; c < 3; ++c) {
-        const float v = tint[c] * canvas.values[std::size_t(y) * std::size_t(width) + std::size_t(x)] + float(noise * random.normal());
+        const float v = tint[c] * canvas.values[std::size_t(y) * std::size_t(width) + std::size_t(x)] +
+                        float(noise * random.normal());
         out.row<std::uint8_t>(y)[3 * x + c] = std::uint8_t(255 * srgb_from_linear(std::clamp(v, 0.f, 1.f)) + .5f);
       }
   return out;

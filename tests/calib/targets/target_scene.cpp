@@ -18,15 +18,17 @@ Pose pose_of(const Camera& camera, const TargetDesign& design, const Lie& lie) {
   const Vector3d ray = camera.ray(lie.pixel).value().normalized();
   const double distance = 2 * design.circle_radius_m() * camera.f * std::cos(lie.tilt) / lie.minor_px;
   Pose pose;
-  pose.rotation = (Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), ray) * AngleAxisd(lie.azimuth, Vector3d::UnitZ()) *
-                   AngleAxisd(lie.tilt, Vector3d::UnitX()) * AngleAxisd(lie.roll - lie.azimuth, Vector3d::UnitZ()))
-                      .normalized();
+  pose.rotation =
+      (Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), ray) * AngleAxisd(lie.azimuth, Vector3d::UnitZ()) *
+       AngleAxisd(lie.tilt, Vector3d::UnitX()) * AngleAxisd(lie.roll - lie.azimuth, Vector3d::UnitZ()))
+          .normalized();
   pose.translation = distance * ray;
   return pose;
 }
 
-Image photograph(const Camera& camera, const std::vector<TargetDesign>& designs, const std::vector<PlacedTarget>& targets,
-                 const Eigen::Vector3f& background, const rig::PrintPhotoOptions& options, std::uint64_t seed) {
+Image photograph(const Camera& camera, const std::vector<TargetDesign>& designs,
+                 const std::vector<PlacedTarget>& targets, const Eigen::Vector3f& background,
+                 const rig::PrintPhotoOptions& options, std::uint64_t seed) {
   std::vector<rig::FlatPrint> prints;
   for (const PlacedTarget& t : targets) {
     prints.push_back(rig::print_of(designs[std::size_t(t.design)], t.id));
@@ -52,9 +54,7 @@ Camera part_of_camera(int width, int height, double f, const Vector2d& principal
 OneTarget one_target(const TargetDesign& design, double minor_px, double tilt, const rig::PrintPhotoOptions& options,
                      std::uint64_t seed, const Eigen::Vector3f& background) {
   std::mt19937_64 random(seed);
-  const auto uniform = [&](double low, double high) {
-    return low + (high - low) * double(random() >> 11) * 0x1p-53;
-  };
+  const auto uniform = [&](double low, double high) { return low + (high - low) * double(random() >> 11) * 0x1p-53; };
   const double pitch_px = minor_px / std::cos(tilt) * design.size_m / (2 * design.circle_radius_m());
   const int side = int(pitch_px * (design.family.grid() + 1) * 1.5) + 24;
   OneTarget one;

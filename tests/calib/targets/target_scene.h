@@ -19,8 +19,8 @@ struct PlacedTarget {
 
 /// How a target lies before the camera.
 struct Lie {
-  Eigen::Vector2d pixel{0, 0};  ///< where its middle is seen
-  double minor_px = 20;         ///< full minor axis of the circle in the middle
+  Eigen::Vector2d pixel{0, 0};             ///< where its middle is seen
+  double minor_px = 20;                    ///< full minor axis of the circle in the middle
   double tilt = 0, azimuth = 0, roll = 0;  ///< rad; tilt between line of sight and normal
 };
 Pose pose_of(const Camera& camera, const calib::TargetDesign& design, const Lie& lie);
@@ -41,8 +41,9 @@ struct OneTarget {
   PlacedTarget target;
   Image photo;
 };
-OneTarget one_target(const calib::TargetDesign& design, double minor_px, double tilt, const rig::PrintPhotoOptions& options,
-                     std::uint64_t seed, const Eigen::Vector3f& background = {.1f, .3f, .1f});
+OneTarget one_target(const calib::TargetDesign& design, double minor_px, double tilt,
+                     const rig::PrintPhotoOptions& options, std::uint64_t seed,
+                     const Eigen::Vector3f& background = {.1f, .3f, .1f});
 
 /// Root of the mean squared distance between measured centres and the truth, px; -1 without features.
 double center_error(const Camera& camera, const calib::TargetDesign& design, const PlacedTarget& truth,
