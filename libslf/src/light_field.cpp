@@ -115,8 +115,10 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
   std::vector<PhotoSamples> samples;
   {
     const SurfaceViewer viewer(mesh, scene, atlas, shadow_offset(mesh, options.visibility_offset));
-    samples = collect_samples(viewer, atlas, photos,
-                              {edge_options(options), float(options.min_cosine), ordinary_pixel(mesh, photos)}, job);
+    EdgeOptions edge = edge_options(options);
+    edge.clean_rim = true;
+    samples =
+        collect_samples(viewer, atlas, photos, {edge, float(options.min_cosine), ordinary_pixel(mesh, photos)}, job);
   }
 
   std::vector<Eigen::Vector3f> gains;
