@@ -224,15 +224,12 @@ TEST(RingFit, APlainObjectIsPlainEverywhere) {
     SCOPED_TRACE(int(method));
     SCOPED_TRACE(terms);
     Job job;
-    // As the defaults have it: rims of the photographs hold green, and the file's JPEGs round. (Non-negative maps hold
-    // the vertices' shares, whose edges JPEG blurs.)
+    // As the defaults have it: rims of the photographs hold green, and the file's JPEGs round.
     slf::LightFieldOptions options;
     options.method = method, options.terms = terms;
-    slf::LightFieldFileOptions file;
-    if (method == Factorization::nmf) file.map_quality = 0;
     const slf::LightField field = slf::fit_light_field(mesh, photos, options, job);
     const slf::LightFieldRenderer renderer(field),
-        read_back(slf::decode_light_field(slf::encode_light_field(field, file), "plain"));
+        read_back(slf::decode_light_field(slf::encode_light_field(field), "plain"));
     for (const View& view : around(3, 3, 3.1, camera(200, 200, 180))) {
       EXPECT_LE(test::largest_difference(renderer.render(view, {}, job).rgba, {200, 90, 30}), 1);
       EXPECT_LE(test::largest_difference(read_back.render(view, {}, job).rgba, {200, 90, 30}), 1);
