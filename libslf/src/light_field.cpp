@@ -134,7 +134,8 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
   field.adds_base = !non_negative || options.terms == 0;
 
   JointFit fit(mesh, atlas, samples, field.nodes,
-               {joint ? options.terms : 0, options.iterations, options.surface_ridge, options.view_smoothness});
+               {joint ? options.terms : 0, options.iterations, options.surface_ridge, options.view_smoothness,
+                !rings_apart});
   const JointFactors factors = fit.run(job);
   double rms = fit.rms;
   std::size_t filled = 0;
