@@ -70,6 +70,7 @@ JointFactors JointFit::run(Job& job) {
     evaluate_nodes(job);
     job.advance();
   }
+  if (terms_ ? kept() == 0 : options_.mean_alone) normals_ = hull::vertex_normals(mesh_);
   fit_surface(job);
   if (terms_) normalise();
   job.advance();
@@ -121,11 +122,25 @@ void JointFit::add_samples(TexelFit& fit, std::size_t block, std::size_t p) cons
   std::array<float, kMaxStartTerms> view;
   const std::uint32_t begin = atlas_.blocks[block], end = atlas_.blocks[block + 1];
   for (std::uint32_t texel = begin; texel < end; ++texel, ++samples) {
-    const float w = samples->weight();
+    float w = samples->weight();
     if (w == 0) continue;
+    if (!normals_.empty()) w *= frontal(atlas_.texels[texel], p);
     if (terms_) interpolate(views_[p], atlas_.texels[texel], view.data());
     fit.add(texel - begin, w, color_of(*samples), {view.data(), terms_});
   }
+}
+
+/// What a frontal view counts more in a mean colour that is all there is, for it is sharper: the square of its cosine,
+/// on top of the samples' own weight. So the mean texture is weighted, too.
+float JointFit::frontal(const Texel& texel, std::size_t photo) const {
+  const auto& t = mesh_.triangles[texel.triangle];
+  const float b0 = 1 - texel.b1 - texel.b2;
+  const auto between = [&](const std::vector<Eigen::Vector3f>& of_vertex) -> Eigen::Vector3f {
+    return b0 * of_vertex[t[0]] + texel.b1 * of_vertex[t[1]] + texel.b2 * of_vertex[t[2]];
+  };
+  const Eigen::Vector3f way = photos_[photo].center - between(mesh_.vertices), normal = between(normals_);
+  const float facing = way.dot(normal);
+  return facing * facing / std::max(way.squaredNorm() * normal.squaredNorm(), 1e-12f);
 }
 
 /// Mean colour and surface maps of every texel.

@@ -24,6 +24,7 @@ struct JointFitOptions {
   int iterations = 8;
   double surface_ridge = 0.05;
   double view_smoothness = 0.02;
+  bool mean_alone = false;  // whether, without terms, the mean colour is all that will be shown
 };
 
 /// Factors as numbers. Texels and terms: `mean` (texels x 3), `surface` (texels x terms x 3); `seen`: sum of a texel's
@@ -60,6 +61,7 @@ class JointFit {
   void start();
   void evaluate_nodes(Job& job);
   void add_samples(TexelFit& fit, std::size_t block, std::size_t photo) const;
+  float frontal(const Texel& texel, std::size_t photo) const;
   void fit_surface(Job& job);
   void fit_views(Job& job);
   void fit_nodes(Job& job);
@@ -83,6 +85,7 @@ class JointFit {
   Eigen::MatrixXf laplacian_;
   std::vector<std::array<std::uint32_t, 3>> edges_of_;  // of each triangle, see ViewSystem::Edges
   std::vector<std::array<std::uint32_t, 2>> edges_;     // lower vertex first
+  std::vector<Eigen::Vector3f> normals_;                // of the vertices, where the mean colour is all that is shown
   std::vector<std::vector<NodeWeights>> weights_;       // photographs x vertices
   std::vector<std::vector<float>> views_;               // photographs x vertices x terms: view maps at the photographs
   std::vector<std::vector<float>> trust_;               // photographs x vertices: the weight behind them

@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t kEveryBlock = 4;            // of so many blocks of texels one is looked at
 constexpr double kNoiseShare = 0.3, kSure = 0.6;  // shares at which a term is dropped, or kept whole
+constexpr double kVisible = 0.5 / 255;            // root mean square of what holds of a term, below which it is dropped
 
 /// The s within 0 … 1 that minimise s·N s - 2 r·s, by coordinate descent: the problem is convex. Where N has nothing:
 /// 0.
@@ -27,7 +28,9 @@ Eigen::VectorXd bounded_least_squares(const Eigen::MatrixXd& normal, const Eigen
 /// samples; then s minimises Σ w |c - T - Σ s_k g_k f_k|² over the left-out samples. On a matt object the terms are
 /// noise, s comes out near 0, and such terms are dropped: between the photographs they would only do harm. Terms that
 /// hold come out below 1, too, because folds are farther from the other photographs than new views are; so from kSure
-/// on they stay as they are.
+/// on they stay as they are. Shares alone do not tell what is worth keeping: how a matt object's photographs blur it,
+/// each by its own foreshortening, holds at others, too, but whoever renders blurs anew. That is little: what changes
+/// the samples by less than half a byte is dropped.
 void JointFit::cross_validate(Job& job) {
   const auto k = std::ptrdiff_t(terms_);
   const std::size_t size = nodes_.size() * terms_, folds = std::min(kFolds, photos_.size());
@@ -47,6 +50,7 @@ void JointFit::cross_validate(Job& job) {
   const std::size_t chunks = (blocks_ + kEveryBlock * kBlocksAtOnce - 1) / (kEveryBlock * kBlocksAtOnce);
   std::vector<Eigen::MatrixXd> normals(chunks, Eigen::MatrixXd::Zero(k, k));
   std::vector<Eigen::VectorXd> rights(chunks, Eigen::VectorXd::Zero(k));
+  std::vector<double> weights(chunks, 0);
   parallel_for(job, chunks, [&](std::size_t chunk) {
     TexelFit fit(terms_, options_.surface_ridge);
     std::vector<float> means, surfaces, view(terms_);
@@ -74,6 +78,7 @@ void JointFit::cross_validate(Job& job) {
                 Eigen::Map<const Eigen::Vector3f>(c.data()) - Eigen::Map<const Eigen::Vector3f>(&means[i * 3]);
             normals[chunk] += (w * (part.transpose() * part)).cast<double>();
             rights[chunk] += (w * (part.transpose() * left)).cast<double>();
+            weights[chunk] += 3.0 * w;
           }
         }
       }
@@ -81,11 +86,14 @@ void JointFit::cross_validate(Job& job) {
   });
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(k, k);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(k);
-  for (std::size_t i = 0; i < chunks; ++i) normal += normals[i], right += rights[i];
+  double weight = 0;
+  for (std::size_t i = 0; i < chunks; ++i) normal += normals[i], right += rights[i], weight += weights[i];
   const Eigen::VectorXd s = bounded_least_squares(normal, right);
   share_.clear();
-  for (const double share : s)
-    share_.push_back(float(std::clamp((share - kNoiseShare) / (kSure - kNoiseShare), 0.0, 1.0)));
+  for (std::ptrdiff_t i = 0; i < k; ++i) {
+    const bool visible = s[i] * s[i] * normal(i, i) >= kVisible * kVisible * weight;
+    share_.push_back(visible ? float(std::clamp((s[i] - kNoiseShare) / (kSure - kNoiseShare), 0.0, 1.0)) : 0);
+  }
 }
 
 }  // namespace lumihull::slf

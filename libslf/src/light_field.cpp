@@ -115,8 +115,10 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
   std::vector<PhotoSamples> samples;
   {
     const SurfaceViewer viewer(mesh, scene, atlas, shadow_offset(mesh, options.visibility_offset));
-    samples = collect_samples(viewer, atlas, photos,
-                              {edge_options(options), float(options.min_cosine), ordinary_pixel(mesh, photos)}, job);
+    EdgeOptions edge = edge_options(options);
+    edge.clean_rim = true;
+    samples =
+        collect_samples(viewer, atlas, photos, {edge, float(options.min_cosine), ordinary_pixel(mesh, photos)}, job);
   }
 
   std::vector<Eigen::Vector3f> gains;
@@ -132,7 +134,8 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
   field.adds_base = !non_negative || options.terms == 0;
 
   JointFit fit(mesh, atlas, samples, field.nodes,
-               {joint ? options.terms : 0, options.iterations, options.surface_ridge, options.view_smoothness});
+               {joint ? options.terms : 0, options.iterations, options.surface_ridge, options.view_smoothness,
+                !rings_apart});
   const JointFactors factors = fit.run(job);
   double rms = fit.rms;
   std::size_t filled = 0;

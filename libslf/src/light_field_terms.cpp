@@ -70,24 +70,13 @@ std::vector<LightFieldTerm> terms_of(const RingFactors& factors, const Atlas& at
     const std::vector<float> values = surface_of(factors.surface, terms, k);
     const ByteScale scale = out[k].surface_scale =
         options.non_negative ? positive_range_of(values, 0) : signed_range_of(values);
-    const std::uint8_t zero = to_byte(0, scale);
-    // What rounding took from a texel in one slot is made good in the next one: neighbours' view maps are alike, and a
-    // plain surface stays plain. (Signed view maps are not: principal components have any sign.)
-    std::vector<float> owed(options.non_negative ? 3 * atlas.texels.size() : 0, 0.0f);
     for (int slot = 0; slot < slots; ++slot) {
-      std::vector<BlendColor> texels(atlas.texels.size(), as_color({zero, zero, zero}));
+      std::vector<BlendColor> texels(atlas.texels.size());  // those of no ring continue the ones around
       for (std::size_t v = 0; v < vertices; ++v) {
         if (rings.slot[v] != slot) continue;
-        for (std::size_t i = rings.first[v]; i < rings.first[v + 1]; ++i) {
-          const std::size_t texel = rings.texels[i].texel;
-          Bytes bytes;
-          for (std::size_t c = 0; c < 3; ++c) {
-            const float wanted = values[3 * i + c] + (owed.empty() ? 0.0f : owed[3 * texel + c]);
-            bytes[c] = to_byte(wanted, scale);
-            if (!owed.empty()) owed[3 * texel + c] = wanted - scale.scale * unit_of_srgb8(bytes[c]);
-          }
-          texels[texel] = as_color(bytes);
-        }
+        for (std::size_t i = rings.first[v]; i < rings.first[v + 1]; ++i)
+          texels[rings.texels[i].texel] = as_color(
+              {to_byte(values[3 * i], scale), to_byte(values[3 * i + 1], scale), to_byte(values[3 * i + 2], scale)});
       }
       out[k].surface.push_back(texture_picture(atlas, texels));
     }

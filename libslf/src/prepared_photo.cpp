@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "color.h"
+#include "rim.h"
 
 namespace lumihull::slf {
 namespace {
@@ -114,6 +115,8 @@ PreparedPhoto::PreparedPhoto(const Photo& photo, const EdgeOptions& edge, const 
 
   const std::vector<std::uint8_t> distance = distance_to_background(alpha);
   std::vector<std::uint8_t> weight(distance.size()), solid(distance.size());
+  const float reach = edge.erosion_px + edge.feather_px + 2;
+  const Rim rim(photo);
   for (int y = 0; y < height_; ++y) {
     const std::uint8_t* a = alpha.row<std::uint8_t>(y);
     for (int x = 0; x < width_; ++x) {
@@ -124,11 +127,11 @@ PreparedPhoto::PreparedPhoto(const Photo& photo, const EdgeOptions& edge, const 
           distance[i] == 255 ? 1.0f : std::clamp((d - edge.erosion_px) / std::max(edge.feather_px, 1e-3f), 0.0f, 1.0f);
       weight[i] = std::uint8_t(std::max(1.0f, std::round(ramp * float(a[x]))));
       solid[i] = float(a[x]) >= 255 * edge.edge_alpha && weight[i] >= 32;
+      if (edge.clean_rim && solid[i] && a[x] < kWholePixel && rim.is_mixture(x, y, reach)) solid[i] = 0;
     }
   }
   const std::vector<Offset> nearest = nearest_solid(solid, width_, height_);
   // Parts too thin to have a solid core keep their own colours.
-  const float reach = edge.erosion_px + edge.feather_px + 2;
   pixels_.resize(distance.size());
   for (int y = 0; y < height_; ++y)
     for (int x = 0; x < width_; ++x) {

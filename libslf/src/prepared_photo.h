@@ -14,6 +14,7 @@ struct EdgeOptions {
   float erosion_px = 0;     ///< pixels nearer to the background than this have next to no weight
   float feather_px = 1;     ///< from there the weight rises to its full value over this width
   float edge_alpha = 0.5f;  ///< pixels of a softer mask take the colour of the nearest one beyond it
+  bool clean_rim = false;   ///< so do those that are nothing but a mixture with the background (see Rim)
 };
 
 /// A photograph ready for blending: sRGB with a weight of 1 … 255 in the fourth byte. The eroded rim, pixels softer

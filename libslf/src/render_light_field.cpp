@@ -199,16 +199,21 @@ Rendering LightFieldRenderer::render(const View& view, const RenderOptions& opti
           for (std::size_t k = 0; k < terms_; ++k)
             for (std::size_t ch = 0; ch < 3; ++ch) color[ch] += products[3 * k + ch];
         };
+        const float share[3] = {1 - s.hit.b1 - s.hit.b2, s.hit.b1, s.hit.b2};
+        float coefficients[kMostLanes];
         if (terms_ && slot_.empty()) {
-          const float share[3] = {1 - s.hit.b1 - s.hit.b2, s.hit.b1, s.hit.b2};
           const float *a = &values[t[0] * lanes], *b = &values[t[1] * lanes], *c = &values[t[2] * lanes];
-          float coefficients[kMostLanes];
           for (std::size_t g = 0; g < groups; ++g)  // a constant number of turns inside, for the compiler
             for (std::size_t i = kLanes * g; i < kLanes * g + kLanes; ++i)
               coefficients[i] = share[0] * a[i] + share[1] * b[i] + share[2] * c[i];
           add(3, coefficients);
         } else if (terms_) {
-          for (int j = 0; j < 3; ++j) add(3 * (1 + slot_[t[j]] * terms_), &values[t[j] * lanes]);
+          for (int j = 0; j < 3; ++j) {
+            const float* a = &values[t[j] * lanes];
+            for (std::size_t g = 0; g < groups; ++g)
+              for (std::size_t i = kLanes * g; i < kLanes * g + kLanes; ++i) coefficients[i] = share[j] * a[i];
+            add(3 * (1 + slot_[t[j]] * terms_), coefficients);
+          }
         }
         return BlendColor{color[0], color[1], color[2], 1};
       },

@@ -112,7 +112,8 @@ class RingFit {
     for (std::size_t i = 0; i < ring.size(); ++i)
       for (std::size_t k = 0; k < terms_; ++k)
         for (std::size_t c = 0; c < 3; ++c)
-          surface[(i * terms_ + k) * 3 + c] = factors.surface(std::ptrdiff_t(3 * i + c), std::ptrdiff_t(k));
+          surface[(i * terms_ + k) * 3 + c] =
+              factors.surface(std::ptrdiff_t(3 * i + c), std::ptrdiff_t(k)) / ring[i].share;
 
     regression.clear();
     factors.view.colwise() -= middle;
@@ -129,7 +130,7 @@ class RingFit {
   void use_mean(std::span<const RingTexel> ring, std::span<float> surface, std::span<float> view) const {
     for (std::size_t i = 0; i < ring.size(); ++i) {
       const auto mean = rgb(colors_[ring[i].texel]);
-      for (std::size_t c = 0; c < 3; ++c) surface[i * terms_ * 3 + c] = ring[i].share * mean[c];
+      for (std::size_t c = 0; c < 3; ++c) surface[i * terms_ * 3 + c] = mean[c];
     }
     for (std::size_t i = 0; i < nodes_.size(); ++i) view[i * terms_] = 1;
   }
@@ -216,13 +217,14 @@ class RingFit {
               const auto mean = rgb(colors_[i]);
               for (std::size_t c = 0; c < 3; ++c) left[c] -= mean[c];
             }
-            const auto& corners = mesh_.triangles[atlas_.texels[i].triangle];
+            const Texel& texel = atlas_.texels[i];
+            const auto& corners = mesh_.triangles[texel.triangle];
+            const std::array<float, 3> hat{1 - texel.b1 - texel.b2, texel.b1, texel.b2};
             for (std::size_t j = 0; j < 3; ++j) {
-              if (rings_.of_texel[i][j] == kNoShare) continue;
               const float* g = &out.surface[rings_.of_texel[i][j] * terms_ * 3];
               const float* h = &view[corners[j] * terms_];
               for (std::size_t k = 0; k < terms_; ++k)
-                for (std::size_t c = 0; c < 3; ++c) left[c] -= g[3 * k + c] * h[k];
+                for (std::size_t c = 0; c < 3; ++c) left[c] -= hat[j] * g[3 * k + c] * h[k];
             }
             for (const float l : left) sums[p].left += double(s->weight()) * l * l;
             sums[p].weight += 3.0 * s->weight();

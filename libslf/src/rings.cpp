@@ -15,6 +15,8 @@
 namespace lumihull::slf {
 namespace {
 
+constexpr float kLeastShare = 0.05f;  // that a texel has in rings which are read, or are to be continued, there
+
 /// A triangle that reads a texel which shows another one.
 struct Reader {
   std::uint32_t texel;
@@ -46,56 +48,6 @@ std::vector<Reader> readers_of(const Atlas& atlas) {
     return std::tie(a.texel, a.distance2, a.triangle) < std::tie(b.texel, b.distance2, b.triangle);
   });
   return readers;
-}
-
-/// Who has which share of one texel: a vertex a slot at most.
-struct Shares {
-  std::array<std::uint32_t, std::size_t(kMaxSlots)> vertex;
-  std::array<float, std::size_t(kMaxSlots)> share;
-  std::uint32_t taken = 0;                             // slots, as bits
-  std::vector<std::array<std::uint8_t, 3>> triangles;  // slots of the corners of those that read the texel
-
-  void clear() {
-    taken = 0;
-    triangles.clear();
-  }
-  bool has(std::uint8_t slot) const { return taken >> slot & 1; }
-  void set(std::uint8_t slot, std::uint32_t v, float s) {
-    taken |= std::uint32_t(1) << slot;
-    vertex[slot] = v, share[slot] = s;
-  }
-};
-
-/// Corners of a triangle whose slots are free get, in equal parts, what its slots lack to a sum of 1.
-void complete(const std::array<std::uint32_t, 3>& corners, const std::array<std::uint8_t, 3>& slots, Shares& shares) {
-  float lacking = 1;
-  int free = 0;
-  for (const std::uint8_t s : slots) {
-    if (shares.has(s))
-      lacking -= shares.share[s];
-    else
-      ++free;
-  }
-  for (int j = 0; j < 3; ++j)
-    if (!shares.has(slots[j])) shares.set(slots[j], corners[j], std::max(0.0f, lacking / float(free)));
-  shares.triangles.push_back(slots);
-}
-
-/// Moves shares by as little as it takes that the slots of every triangle sum to 1: next to a vertex its neighbours'
-/// shares can't all be what they are in the texel's own triangle. Cyclic projections (Kaczmarz 1937) onto the sums,
-/// none below 0; thirds fulfil all of them, so there is an answer.
-void balance(Shares& shares) {
-  constexpr int kRounds = 200;
-  constexpr float kGoodEnough = 2e-4f;
-  float worst = 1;
-  for (int round = 0; round < kRounds && worst > kGoodEnough; ++round) {
-    worst = 0;
-    for (const auto& [a, b, c] : shares.triangles) {
-      const float lacking = 1 - (shares.share[a] + shares.share[b] + shares.share[c]);
-      worst = std::max(worst, std::abs(lacking));
-      for (const std::uint8_t s : {a, b, c}) shares.share[s] = std::max(0.0f, shares.share[s] + lacking / 3);
-    }
-  }
 }
 
 }  // namespace
@@ -145,37 +97,31 @@ Rings make_rings(const hull::Mesh& mesh, const Atlas& atlas, std::vector<std::ui
   const std::vector<Reader> readers = readers_of(atlas);
   std::vector<Part> parts;
   parts.reserve(atlas.texels.size() * 3 + readers.size());
-  Shares shares;
   auto reader = readers.begin();
   for (std::uint32_t i = 0; i < atlas.texels.size(); ++i) {
     const Texel& texel = atlas.texels[i];
     const auto& t = mesh.triangles[texel.triangle];
     const std::array<float, 3> own{1 - texel.b1 - texel.b2, texel.b1, texel.b2};
-    const auto slots_of_corners = [&](const std::array<std::uint32_t, 3>& corners) {
-      return std::array{rings.slot[corners[0]], rings.slot[corners[1]], rings.slot[corners[2]]};
-    };
-    shares.clear();
-    for (int j = 0; j < 3; ++j) shares.set(rings.slot[t[j]], t[j], own[j]);
-    shares.triangles.push_back(slots_of_corners(t));
-    for (; reader != readers.end() && reader->texel == i; ++reader) {
-      const auto& corners = mesh.triangles[reader->triangle];
-      complete(corners, slots_of_corners(corners), shares);
+    std::uint32_t taken = 0;  // slots, as bits
+    for (int j = 0; j < 3; ++j) {
+      parts.push_back({t[j], i, std::clamp(own[std::size_t(j)], kLeastShare, 1.0f), j});
+      taken |= std::uint32_t(1) << rings.slot[t[j]];
     }
-    if (shares.triangles.size() > 1) balance(shares);
-    for (std::uint32_t left = shares.taken; left; left &= left - 1) {
-      const auto s = std::size_t(std::countr_zero(left));
-      if (!(shares.share[s] > 0)) continue;
-      const auto corner = std::find(t.begin(), t.end(), shares.vertex[s]);
-      parts.push_back(
-          {shares.vertex[s], i, std::min(shares.share[s], 1.0f), corner == t.end() ? -1 : int(corner - t.begin())});
-    }
+    // Where several triangles read the texel, the nearest ones' corners come first.
+    for (; reader != readers.end() && reader->texel == i; ++reader)
+      for (const std::uint32_t v : mesh.triangles[reader->triangle]) {
+        const std::uint32_t bit = std::uint32_t(1) << rings.slot[v];
+        if (taken & bit) continue;
+        parts.push_back({v, i, kLeastShare, -1});
+        taken |= bit;
+      }
   }
 
   rings.first.assign(mesh.vertices.size() + 1, 0);
   for (const Part& p : parts) ++rings.first[p.vertex + 1];
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) rings.first[v + 1] += rings.first[v];
   rings.texels.resize(parts.size());
-  rings.of_texel.assign(atlas.texels.size(), {kNoShare, kNoShare, kNoShare});
+  rings.of_texel.resize(atlas.texels.size());
   std::vector<std::uint32_t> next(rings.first.begin(), rings.first.end() - 1);
   for (const Part& p : parts) {
     const std::uint32_t at = next[p.vertex]++;

@@ -11,7 +11,7 @@
 
 namespace lumihull::slf {
 
-/// A texel of a vertex's ring, and the vertex's share of it (its hat function Λ there).
+/// A texel of a vertex's ring, and what it counts there: the vertex's hat function Λ, or a little more.
 struct RingTexel {
   std::uint32_t texel;
   float share;  // > 0, at most 1
@@ -19,20 +19,19 @@ struct RingTexel {
 
 /// The surroundings of all vertices in an atlas, and the pictures (slots) that have room for the maps of all of them.
 ///
-/// Bilinear interpolation near a triangle's edge reads texels that show the triangle beyond it. So that the slots of
-/// the triangle's corners sum to 1 there as well, such a texel also has a share for them, in slots that the triangle
-/// beyond leaves free: rings reach a texel beyond their triangles, and hats are a little blunt near vertices.
+/// Bilinear interpolation near a triangle's edge reads texels that show the triangle beyond it. Such a texel belongs to
+/// the rings of the corners of both, as far as slots are free: rings reach a texel beyond their triangles. Where a slot
+/// is taken, hats are next to zero, or the triangle is hardly larger than a texel.
 struct Rings {
   std::vector<std::uint8_t> slot;                      // of each vertex
   std::vector<std::uint32_t> first;                    // of each vertex, in `texels`, and one past the last
   std::vector<RingTexel> texels;                       // ring by ring, ascending
-  std::vector<std::array<std::uint32_t, 3>> of_texel;  // where the corners of a texel's triangle have it; kNoShare
+  std::vector<std::array<std::uint32_t, 3>> of_texel;  // where the corners of a texel's triangle have it
 
   std::span<const RingTexel> of(std::size_t vertex) const {
     return {&texels[first[vertex]], first[vertex + 1] - first[vertex]};
   }
 };
-inline constexpr std::uint32_t kNoShare = ~std::uint32_t(0);
 
 /// A slot for each vertex, no two of a triangle alike: the smallest that is free, vertices in order of falling degree.
 /// Throws Error{unsupported} where kMaxSlots slots do not suffice.

@@ -95,7 +95,7 @@ const StageDefinition& lightfield_stage() {
   static const LightFieldFileOptions file_defaults;
   static const StageDefinition stage{
       "lightfield",
-      2,
+      4,
       {
           {"factorization",
            "joint (all vertices together), pca or nmf (each vertex's ring of triangles by itself)",

@@ -40,6 +40,13 @@ void TexelFit::solve(std::size_t texel, float* mean, float* surface) {
   for (std::ptrdiff_t k = 0; k < n; ++k)
     for (std::ptrdiff_t ch = 0; ch < 3; ++ch) rhs_(k, ch) = right_[(texel * n_ + std::size_t(k)) * 3 + std::size_t(ch)];
   colors_ = rhs_;
+  for (std::ptrdiff_t k = 1; k < n; ++k)
+    if (shares_[k] == 0) {  // the others are fitted without it
+      system_.row(k).setZero();
+      system_.col(k).setZero();
+      system_(k, k) = 1;
+      colors_.row(k).setZero();
+    }
   system_.selfadjointView<Eigen::Lower>().llt().solveInPlace(colors_);
   colors_ = shares_.asDiagonal() * colors_;
   for (std::ptrdiff_t ch = 0; ch < 3; ++ch) {

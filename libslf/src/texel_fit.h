@@ -13,7 +13,7 @@ namespace lumihull::slf {
 class TexelFit {
  public:
   /// ridge: pulls surface maps, not the mean, towards 0, in shares of a texel's weight. shares: what solve keeps of
-  /// each term, 0 … 1; empty: all.
+  /// each term, 0 … 1; empty: all. A term of which nothing is kept has no part in the fit of the others.
   TexelFit(std::size_t terms, double ridge, std::span<const float> shares = {});
 
   void clear(std::size_t texels);

@@ -39,8 +39,7 @@ struct LightFieldTerm {
 /// with corners v_1 v_2 v_3, seen from the eye e, has the colour (sRGB values, 0 … 1)
 ///
 ///     c(p, e) = T(p) + Σ_k Σ_j Λ_j(p) g_k(p) h_k[v_j](e)                    surface maps common to all vertices
-///     c(p, e) = T(p) + Σ_k Σ_j g_k[slot(v_j)](p) h_k[v_j](e)                surface maps of each vertex, Λ_j within
-///     them
+///     c(p, e) = T(p) + Σ_k Σ_j Λ_j(p) g_k[slot(v_j)](p) h_k[v_j](e)         surface maps of each vertex
 ///
 /// T the base's texture (left out where `adds_base` is false), Λ_j the barycentric coordinates. View maps are values at
 /// nodes, places that an eye may be at: h_k[v](e) = Σ_i w_i(v, e) h_k[v, i], with w the weights of `node_weights`.

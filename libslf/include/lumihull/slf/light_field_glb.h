@@ -10,7 +10,7 @@
 namespace lumihull::slf {
 
 struct LightFieldFileOptions {
-  int texture_quality = 85;  ///< of the mean colour's JPEG, 1 … 100; 0: PNG, without loss
+  int texture_quality = 92;  ///< of the mean colour's JPEG, as the mean texture's, 1 … 100; 0: PNG, without loss
   int map_quality = 75;      ///< of the surface maps' JPEGs, likewise
 };
 
