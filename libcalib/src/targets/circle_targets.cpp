@@ -81,24 +81,21 @@ void lattice_circles(std::span<const Blob> blobs, const CircleLattice& lattice, 
 // What was measured of a window's circles.
 struct Contours {
   std::vector<EllipseFit> fits;  // of states that are not asked for: no_fit
-  int good = 0, disturbed = 0;
+  int good = 0;
 };
 
-// Measures the circles whose state is good. The plane may be a part of the photograph that begins at `origin`.
-Contours measure(const LightPlane& plane, const Vector2d& origin, std::span<const Ellipse> circles,
-                 std::span<const EllipseState> states, const CellReading& first, const CircleLook& look,
-                 const DetectOptions& options) {
+// Measures the circles whose state is good.
+Contours measure(const LightPlane& plane, std::span<const Ellipse> circles, std::span<const EllipseState> states,
+                 const CellReading& first, const CircleLook& look, const DetectOptions& options) {
   Contours contours;
   contours.fits.resize(circles.size());
   for (std::size_t i = 0; i < circles.size(); ++i) {
     if (states[i] != EllipseState::good) continue;
-    Ellipse guess = circles[i];
-    guess.center -= origin;
+    const Ellipse& guess = circles[i];
     EllipseOptions fit_options = options.ellipse;
     fit_options.inner_ratio = first.cells[i] == Cell::light && !look.solid_light ? look.ring_ratio : 0;
     EllipseFit& fit = contours.fits[i];
     fit = options.refine ? fit_ellipse(plane, guess, fit_options) : dual_conic_fit(plane, guess, fit_options);
-    if (fit.state == EllipseState::occluded || fit.state == EllipseState::no_fit) ++contours.disturbed;
     if (fit.state != EllipseState::good) continue;
     const Ellipse& e = fit.ellipse;
     // A contour that is not the one that was meant.
@@ -107,32 +104,9 @@ Contours measure(const LightPlane& plane, const Vector2d& origin, std::span<cons
       fit.state = EllipseState::no_fit;
       continue;
     }
-    fit.ellipse.center += origin;
     ++contours.good;
   }
   return contours;
-}
-
-// The rectangle of a plane that holds the circles with room about them.
-LightPlane part_of(const LightPlane& plane, std::span<const Ellipse> circles, std::span<const EllipseState> states,
-                   Eigen::Vector2i& corner) {
-  const int width = plane.values.width(), height = plane.values.height();
-  Vector2d low(width, height), high(0, 0);
-  for (std::size_t i = 0; i < circles.size(); ++i) {
-    if (states[i] != EllipseState::good) continue;
-    const Vector2d room = Vector2d::Constant(2 * circles[i].a + 16);
-    low = low.cwiseMin(circles[i].center - room), high = high.cwiseMax(circles[i].center + room);
-  }
-  corner = {std::clamp(int(low.x()), 0, width - 1), std::clamp(int(low.y()), 0, height - 1)};
-  const int right = std::clamp(int(high.x()) + 1, corner.x() + 1, width);
-  const int bottom = std::clamp(int(high.y()) + 1, corner.y() + 1, height);
-  LightPlane part;
-  part.noise = plane.noise;
-  part.saturation = plane.saturation;
-  part.values = Image::uninitialized(right - corner.x(), bottom - corner.y(), 1, PixelType::f32);
-  for (int y = corner.y(); y < bottom; ++y)
-    std::copy_n(plane.values.row<float>(y) + corner.x(), right - corner.x(), part.values.row<float>(y - corner.y()));
-  return part;
 }
 
 struct Try {
@@ -305,17 +279,7 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   }
   const CircleLook look = look_of(design);
   const CellReading first = read_cells(plane, circles, states, grid, 2 * grid - 1, look);
-  Contours contours = measure(plane, {0, 0}, circles, states, first, look, options);
-  // Where a third of the contours look disturbed, it is not a hand: JPEG's and demosaicing's errors stand at edges, and
-  // the noise of smooth places does not tell of them. Then the noise is what makes the contours agree.
-  for (double factor = 3; 10 * contours.good < 8 * int(n) && 3 * contours.disturbed > int(n) && factor < 10;
-       factor *= 3) {
-    Eigen::Vector2i corner;
-    LightPlane part = part_of(plane, circles, states, corner);
-    part.noise.read *= factor * factor, part.noise.gain *= factor * factor;
-    Contours again = measure(part, corner.cast<double>(), circles, states, first, look, options);
-    if (again.good > contours.good) contours = std::move(again);
-  }
+  const Contours contours = measure(plane, circles, states, first, look, options);
   const std::vector<EllipseFit>& fits = contours.fits;
   const int good = contours.good;
   std::vector<EllipseState> readable(n);

@@ -16,6 +16,7 @@ constexpr int kSize = ContourModel::kSize;
 constexpr double kLightChange = 1e-4;
 constexpr double kRatioSd = 0.03;  // of a ring's ratio, a priori: ink spreads
 constexpr double kLeastRaise = 1.2;  // of the noise: less may be chance
+constexpr float kOnSlope = 0.25f;    // of the steepest slope
 constexpr int kFlush = 32;         // blocks that are summed in float
 
 }  // namespace
@@ -92,7 +93,8 @@ void ContourFit::weigh() {
   const double scale = noise_scale_ * noise_scale_;
   for (Block& block : blocks_)
     for (int i = 0; i < kLanes; ++i) {
-      const double v = double(block.expected[i]), variance = std::max(1e-14, scale * plane_.noise.variance(v));
+      const double v = double(block.expected[i]), jitter = jitter_px_ * double(block.slope[i]);
+      const double variance = std::max(1e-14, scale * plane_.noise.variance(v)) + jitter * jitter;
       // By the model, not only by the value: to leave out those that noise has lifted would pull the level down.
       const bool clipped =
           block.value[i] >= plane_.saturation || v > double(plane_.saturation) - 2 * std::sqrt(variance);
@@ -250,19 +252,35 @@ void ContourFit::measure_sectors(double tolerance) {
   }
 }
 
-bool ContourFit::raise_noise(double most) {
-  // Pixels beside each other in a row: what is wrong with the model changes slowly from one to the next, noise does not.
-  scratch_.clear();
+void ContourFit::loosen(double most, double most_px) {
+  float steepest = 0;
   for (const Block& block : blocks_)
-    for (int i = 0; i + 1 < block.count; ++i)
-      if (block.pixels.x[i + 1] - block.pixels.x[i] == 1 && block.pixels.y[i + 1] == block.pixels.y[i] &&
-          block.value[i] < plane_.saturation && block.value[i + 1] < plane_.saturation)
-        scratch_.push_back(std::abs(block.value[i + 1] - block.expected[i + 1] - block.value[i] + block.expected[i]) /
-                           std::sqrt(block.variance[i] + block.variance[i + 1]));
-  const double scale = std::min(noise_scale_ * std::min(median_scale(), robust_scale()), most);
-  if (!(scale >= kLeastRaise * noise_scale_)) return false;
-  noise_scale_ = scale;
-  return true;
+    for (int i = 0; i < block.count; ++i) steepest = std::max(steepest, std::abs(block.slope[i]));
+  if (!(steepest > 0)) return;
+  const auto gather = [&](bool on_slope, auto value) {
+    scratch_.clear();
+    for (const Block& block : blocks_)
+      for (int i = 0; i < block.count; ++i)
+        if ((std::abs(block.slope[i]) >= kOnSlope * steepest) == on_slope && block.value[i] < plane_.saturation)
+          scratch_.push_back(value(block, i));
+  };
+  const auto residual = [](const Block& block, int i) { return std::abs(block.value[i] - block.expected[i]); };
+  const auto variance = [&](const Block& block, int i) {
+    return float(std::max(1e-14, plane_.noise.variance(double(block.expected[i]))));
+  };
+  gather(false, [&](const Block& block, int i) { return residual(block, i) / std::sqrt(variance(block, i)); });
+  if (const double scale = median_scale(); scale > kLeastRaise)
+    noise_scale_ = std::max(1.0, std::min(scale, most));
+
+  double noise = 0;
+  gather(true, [&](const Block& block, int i) {
+    noise += double(variance(block, i) / (block.slope[i] * block.slope[i]));
+    return residual(block, i) / std::abs(block.slope[i]);
+  });
+  if (scratch_.empty()) return;
+  noise *= noise_scale_ * noise_scale_ / double(scratch_.size());
+  const double seen = median_scale();
+  if (seen * seen > kLeastRaise * kLeastRaise * noise) jitter_px_ = std::min(std::sqrt(seen * seen - noise), most_px);
 }
 
 double ContourFit::robust_scale() {

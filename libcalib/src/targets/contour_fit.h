@@ -65,13 +65,12 @@ class ContourFit {
   /// Median of |residual| / standard deviation, over 0.6745.
   double robust_scale();
 
-  /// Takes the noise for what neighbouring pixels differ in beside what the model expects, where that is more than the plane
-  /// says; at most `most` standard deviations of what the plane says. JPEG keeps noise near edges and takes it out of
-  /// smooth places, where the plane's was measured, and demosaicing leaves a texture along edges. True where it changed
-  /// much; weigh() then uses it.
-  bool raise_noise(double most);
-  /// Standard deviation of the noise in units of the plane's, >= 1.
-  double noise_scale() const { return noise_scale_; }
+  /// Takes the pixels for as uncertain as their residuals are, beside the contour and on its slope: noise grows, up to `most`
+  /// times the plane's standard deviation, and weigh() adds (jitter · slope)² to the pixels' variance, up to `most_px`. For
+  /// pictures whose edges are not a blurred step in linear light, whatever their smooth places say of noise: JPEG,
+  /// demosaicing, sharpening, edges mixed in sRGB.
+  void loosen(double most, double most_px);
+  bool loosened() const { return jitter_px_ > 0 || noise_scale_ > 1; }
 
   std::vector<Sector>& sectors() { return sectors_; }
   /// Of the last solve: Σ residual² / variance, pixels that counted, inverse of the normal matrix.
@@ -99,10 +98,10 @@ class ContourFit {
   std::vector<Sector> sectors_;
   BlurredEllipse share_;
   bool ring_ = false;
-  double squares_ = 0, noise_scale_ = 1;
+  double squares_ = 0, jitter_px_ = 0, noise_scale_ = 1;
   int pixels_ = 0, clipped_ = 0, gathered_ = 0;
   ContourModel::Matrix information_ = ContourModel::Matrix::Zero();
-  double median_scale();  ///< of the absolute values in scratch_, as the standard deviation of noise
+  double median_scale();  ///< standard deviation of noise with the absolute values in scratch_
   std::vector<float> scratch_;
 };
 

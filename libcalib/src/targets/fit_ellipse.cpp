@@ -20,7 +20,8 @@ constexpr double kTolerance = 0.02, kSectorTolerance = 0.005;
 constexpr double kSectorSigma = 4.5;      // beyond which a part's residuals are no noise
 constexpr double kShiftTolerance = 0.01;  // px that a part may be off: below what such contours are good for
 constexpr double kRobustSigma = 4;
-constexpr double kMostNoise = 0.05;  // of the step: what residuals may pass for noise, whatever the plane says
+constexpr double kMostNoise = 0.05;   // of the step: what residuals may pass for noise, whatever the plane says
+constexpr double kMostJitter = 0.15;  // px: what edges may differ by from the model's, pixel by pixel
 
 /// Upper limit of χ²_n / n at so many standard deviations (Wilson & Hilferty 1931).
 double chi_square_limit(int n, double sigma) {
@@ -93,7 +94,7 @@ bool judge_sectors(std::vector<ContourFit::Sector>& sectors) {
 enum class Effort : std::uint8_t {
   plain,    ///< nothing is in the way, or little
   careful,  ///< parts of the contour are taken to be disturbed
-  noisier,  ///< the same, and noise may be more than the plane says
+  noisier,  ///< the same, and edges need not be quite as the model has them
 };
 
 /// Fits the pixels of one band. Where parts of the contour are disturbed the rest is fitted alone; false: there is no rest, or
@@ -102,7 +103,6 @@ bool fit_band(ContourFit& pixels, ContourModel& model, double noise, Effort effo
   pixels.expect(model, ratio);
   pixels.weigh();
   const auto tolerance = [&] { return kSectorTolerance * std::abs(model.p[ContourModel::step]); };
-  const auto most_noise = [&] { return kMostNoise * std::abs(model.p[ContourModel::step]) / noise; };
   if (effort == Effort::plain) {
     const ContourModel start = model;
     if (pixels.solve(model, 20, converged, 0, ratio)) {
@@ -117,10 +117,14 @@ bool fit_band(ContourFit& pixels, ContourModel& model, double noise, Effort effo
   // A fit that disturbances do not pull shows where they are: large residuals count ever less.
   const double step = std::abs(model.p[ContourModel::step]) / noise;
   for (const double share : {0.3, 0.1, 0.0}) {
+    if (share == 0 && effort == Effort::noisier) break;  // that is for noise that is known
     const double scale = std::max({kRobustSigma * std::clamp(pixels.robust_scale(), 1.0, 10.0), share * step});
     if (!pixels.solve(model, 10, 1e-3, scale, ratio)) return false;
   }
-  if (effort == Effort::noisier && pixels.raise_noise(most_noise())) pixels.weigh();
+  if (effort == Effort::noisier) {
+    pixels.loosen(kMostNoise * std::abs(model.p[ContourModel::step]) / noise, kMostJitter);
+    pixels.weigh();
+  }
   for (int i = 0; i < 6; ++i) {
     pixels.measure_sectors(tolerance());
     if (!judge_sectors(pixels.sectors()) && i > 0) return true;
@@ -174,7 +178,7 @@ EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const Elli
   const int freedom = pixels.pixels() - (ring ? ContourModel::kSize : ContourModel::kSize - 1);
   if (freedom <= 0) return fit;
   const double variance_ratio = pixels.squares() / freedom;
-  fit.residual = std::sqrt(variance_ratio) * pixels.noise_scale();
+  fit.residual = std::sqrt(variance_ratio);
 
   // d Q / d root, Q = root².
   Eigen::Matrix<double, 5, ContourModel::kSize> j = Eigen::Matrix<double, 5, ContourModel::kSize>::Zero();
@@ -186,9 +190,10 @@ EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const Elli
   fit.covariance = j * inverse * j.transpose() * std::max(1.0, variance_ratio / 1.3);
   if (!fit.covariance.allFinite() || !(fit.covariance(0, 0) > 0) || !(fit.covariance(1, 1) > 0)) return fit;
 
-  const double noise =
-      pixels.noise_scale() * std::sqrt(std::max(1e-14, plane.noise.variance(0.5 * (fit.inside + fit.outside))));
-  const double step = std::abs(model.p[ContourModel::step]), tolerated = kTolerance * step / noise;
+  const double noise = std::sqrt(std::max(1e-14, plane.noise.variance(0.5 * (fit.inside + fit.outside))));
+  const double step = std::abs(model.p[ContourModel::step]), most = kTolerance * step / noise;
+  // Where noise is what the residuals are there is no more to be forgiven.
+  const double tolerated = pixels.loosened() ? std::min(most, 1.0) : most;
   if (pixels.clipped() > options.max_saturated * pixels.gathered())
     fit.state = EllipseState::saturated;
   else if (step < options.min_contrast_noise * noise)
