@@ -133,9 +133,9 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
   field.nodes = nodes_of(mesh, samples, std::size_t(options.max_nodes));
   field.adds_base = !non_negative || options.terms == 0;
 
-  JointFit fit(mesh, atlas, samples, field.nodes,
-               {joint ? options.terms : 0, options.iterations, options.surface_ridge, options.view_smoothness,
-                !rings_apart});
+  JointFit fit(
+      mesh, atlas, samples, field.nodes,
+      {joint ? options.terms : 0, options.iterations, options.surface_ridge, options.view_smoothness, !rings_apart});
   const JointFactors factors = fit.run(job);
   double rms = fit.rms;
   std::size_t filled = 0;

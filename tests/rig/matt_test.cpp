@@ -42,8 +42,8 @@ TEST(Matt, ItsLightFieldLosesNothingAgainstTheMeanTexture) {
     const Image picture = read_image(truth / "test_views" / (v.name + ".png")),
                 mask = read_image(truth / "test_views" / "masks" / (v.name + ".png"));
     const auto quality = [&](const slf::Rendering& rendering) {
-      return slf::compare_pictures(slf::composited(rendering.rgba, {0, 0, 0}), slf::composited(picture, mask, {0, 0, 0}),
-                                   mask)
+      return slf::compare_pictures(slf::composited(rendering.rgba, {0, 0, 0}),
+                                   slf::composited(picture, mask, {0, 0, 0}), mask)
           .psnr_inside;
     };
     of_field += quality(field.render(v.view, {.rays = 3}, job)) / double(path.size());
