@@ -65,8 +65,8 @@ std::string json_of(const calib::TargetSet& set, const Detection& d) {
   for (std::size_t i = 0; i < d.features.size(); ++i) {
     const calib::Feature& f = d.features[i];
     text += std::string(i ? ", " : "") + "{\"index\": " + std::to_string(f.index) + ", \"pixel\": [" +
-            number(f.pixel.x()) + ", " + number(f.pixel.y()) + "], \"covariance\": [" + number(f.covariance(0, 0)) + ", " +
-            number(f.covariance(0, 1)) + ", " + number(f.covariance(1, 1)) + "]}";
+            number(f.pixel.x()) + ", " + number(f.pixel.y()) + "], \"covariance\": [" + number(f.covariance(0, 0)) +
+            ", " + number(f.covariance(0, 1)) + ", " + number(f.covariance(1, 1)) + "]}";
   }
   return text + "]}";
 }
@@ -179,9 +179,10 @@ void add_detect(Program& program) {
                    "aruco:6x6_250:35mm, joined by commas")
       ->required();
   verb->add_option("--ink-key", a->ink_key, "a trained colour key: target ink against everything else");
-  verb->add_option("--learn-ink-key", a->learn_ink_key,
-                   "a file for such a key, learned from the targets that were found: for photographs in which other dark "
-                   "things disturb");
+  verb->add_option(
+      "--learn-ink-key", a->learn_ink_key,
+      "a file for such a key, learned from the targets that were found: for photographs in which other dark "
+      "things disturb");
   verb->add_option("--draw", a->draw, "folder for the photographs with what was found drawn in");
   verb->add_option("--magnify", a->magnify, "how much larger residuals are drawn")->check(CLI::Range(0.0, 1e6));
 }

@@ -73,13 +73,15 @@ void bind_detections(py::module_& module) {
       .def_property_readonly(
           "covariances",
           [](const Detection& d) {
-            return of_features<double>(d, {2, 2}, [](const auto& f, double* to) { row_major<2, 2>(to) = f.covariance; });
+            return of_features<double>(d, {2, 2},
+                                       [](const auto& f, double* to) { row_major<2, 2>(to) = f.covariance; });
           },
           "(n, 2, 2) px².")
       .def_property_readonly(
           "dual_conics",
           [](const Detection& d) {
-            return of_features<double>(d, {3, 3}, [](const auto& f, double* to) { row_major<3, 3>(to) = f.dual_conic; });
+            return of_features<double>(d, {3, 3},
+                                       [](const auto& f, double* to) { row_major<3, 3>(to) = f.dual_conic; });
           },
           "(n, 3, 3) of the ellipses; zero for corners.")
       .def_property_readonly(
@@ -102,8 +104,8 @@ void bind_detections(py::module_& module) {
       .def_readonly("refused", &Detections::refused);
 
   py::class_<TargetDetector>(module, "TargetDetector", "Finds, reads and measures the targets of a set.")
-      .def(py::init([](const TargetSet& set, std::optional<calib::ColorKey> ink_key, double min_circle_px, double correct,
-                       bool refine) {
+      .def(py::init([](const TargetSet& set, std::optional<calib::ColorKey> ink_key, double min_circle_px,
+                       double correct, bool refine) {
              calib::DetectOptions options;
              options.ink_key = std::move(ink_key);
              options.min_circle_px = min_circle_px;
@@ -133,8 +135,9 @@ void bind_detections(py::module_& module) {
           "photo"_a, "found"_a, "magnify"_a = 100.0, "The photograph with what was found drawn in.");
 
   using calib::InkSamples;
-  py::class_<InkSamples>(module, "InkSamples",
-                         "Samples of targets' ink and of what is around it, from photographs in which targets were found.")
+  py::class_<InkSamples>(
+      module, "InkSamples",
+      "Samples of targets' ink and of what is around it, from photographs in which targets were found.")
       .def(py::init<>())
       .def(
           "add",

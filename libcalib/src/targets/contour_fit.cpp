@@ -14,10 +14,10 @@ constexpr int kSize = ContourModel::kSize;
 // The light's relative change over a pixel, a priori: 10 % over a thousand pixels, with the tails of a Cauchy
 // distribution, so that where the picture shows more it is believed.
 constexpr double kLightChange = 1e-4;
-constexpr double kRatioSd = 0.03;  // of a ring's ratio, a priori: ink spreads
+constexpr double kRatioSd = 0.03;    // of a ring's ratio, a priori: ink spreads
 constexpr double kLeastRaise = 1.2;  // of the noise: less may be chance
 constexpr float kOnSlope = 0.25f;    // of the steepest slope
-constexpr int kFlush = 32;         // blocks that are summed in float
+constexpr int kFlush = 32;           // blocks that are summed in float
 
 }  // namespace
 
@@ -269,8 +269,7 @@ void ContourFit::loosen(double most, double most_px) {
     return float(std::max(1e-14, plane_.noise.variance(double(block.expected[i]))));
   };
   gather(false, [&](const Block& block, int i) { return residual(block, i) / std::sqrt(variance(block, i)); });
-  if (const double scale = median_scale(); scale > kLeastRaise)
-    noise_scale_ = std::max(1.0, std::min(scale, most));
+  if (const double scale = median_scale(); scale > kLeastRaise) noise_scale_ = std::max(1.0, std::min(scale, most));
 
   double noise = 0;
   gather(true, [&](const Block& block, int i) {

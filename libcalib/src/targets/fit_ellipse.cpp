@@ -97,8 +97,8 @@ enum class Effort : std::uint8_t {
   noisier,  ///< the same, and edges need not be quite as the model has them
 };
 
-/// Fits the pixels of one band. Where parts of the contour are disturbed the rest is fitted alone; false: there is no rest, or
-/// no answer.
+/// Fits the pixels of one band. Where parts of the contour are disturbed the rest is fitted alone; false: there is no
+/// rest, or no answer.
 bool fit_band(ContourFit& pixels, ContourModel& model, double noise, Effort effort, double converged, double ratio) {
   pixels.expect(model, ratio);
   pixels.weigh();

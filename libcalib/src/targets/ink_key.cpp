@@ -101,10 +101,21 @@ void InkSamples::add(const Image& photo, const TargetSet& set, const Detections&
 
 ColorKey InkSamples::train(int k, Job& job) const {
   if (ink_.total() < kLeastInk)
-    throw Error(ErrorCode::degenerate,
-                "only " + std::to_string(ink_.total()) + " pixels of ink were found, 1000 are needed: take photographs in "
-                "which targets are larger, or leave the key out");
-  return ColorKey::train(subsample(around_.counts(), kAroundSamples), subsample(ink_.counts(), kInkSamples), k, job);
+    throw Error(ErrorCode::degenerate, "only " + std::to_string(ink_.total()) +
+                                           " pixels of ink were found, 1000 are needed: take photographs in "
+                                           "which targets are larger, or leave the key out");
+  // Ink that was not taken for such (the bar on a sheet, a target that was overlooked) must not outvote what was: where
+  // a cell of 8 x 8 x 8 colours holds a larger part of the ink than of the rest, it is the ink's.
+  const auto cell = [](Rgb c) {
+    return std::size_t(c[0] >> 3) << 10 | std::size_t(c[1] >> 3) << 5 | std::size_t(c[2] >> 3);
+  };
+  const std::vector<ColorCount> ink = ink_.counts();
+  std::vector<ColorCount> around = around_.counts();
+  std::vector<double> balance(std::size_t(1) << 15);
+  for (const ColorCount& c : ink) balance[cell(c.color)] += double(c.count) / double(ink_.total());
+  for (const ColorCount& c : around) balance[cell(c.color)] -= double(c.count) / double(around_.total());
+  std::erase_if(around, [&](const ColorCount& c) { return balance[cell(c.color)] > 0; });
+  return ColorKey::train(subsample(around, kAroundSamples), subsample(ink, kInkSamples), k, job);
 }
 
 }  // namespace lumihull::calib

@@ -20,8 +20,7 @@ struct InkKey : testing::Test {
     set.designs = designs;
     const Vector2d places[] = {{130, 130}, {480, 150}, {250, 350}};
     for (int i = 0; i < 3; ++i)
-      targets.push_back(
-          {0, 3 + i, test::pose_of(camera, designs[0], test::Lie{places[i], 14, 0.4, 1.0, 0.5 * i})});
+      targets.push_back({0, 3 + i, test::pose_of(camera, designs[0], test::Lie{places[i], 14, 0.4, 1.0, 0.5 * i})});
   }
   Image photo() const {
     rig::PrintPhotoOptions options;
@@ -51,6 +50,20 @@ TEST_F(InkKey, LearnedFromWhatWasFoundItFindsTheSame) {
     for (std::size_t k = 0; k < plain.targets[i].features.size(); ++k)  // contours are measured in the same light
       EXPECT_LT((keyed.targets[i].features[k].pixel - plain.targets[i].features[k].pixel).norm(), 1e-3);
   }
+}
+
+TEST_F(InkKey, InkElsewhereDoesNotOutvoteIt) {
+  Job job({}, 1);
+  rig::PrintPhotoOptions plain;  // one colour for all of the ink, as on a page that was never printed
+  Image picture = test::photograph(camera, designs, targets, Vector3f(.03f, .2f, .04f), plain, 5);
+  const Detections found = TargetDetector(set).detect(picture, job);
+  ASSERT_EQ(found.targets.size(), targets.size());
+  for (int y = 440; y < 460; ++y)
+    for (int x = 450; x < 600; ++x)
+      for (int c = 0; c < 3; ++c) picture.row<std::uint8_t>(y)[3 * x + c] = designs[0].ink[std::size_t(c)];
+  InkSamples samples;
+  samples.add(picture, set, found);
+  EXPECT_TRUE(samples.train(7, job).is_object(designs[0].ink));
 }
 
 TEST_F(InkKey, WithoutInkThereIsNoKey) {

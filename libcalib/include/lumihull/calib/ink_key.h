@@ -15,14 +15,15 @@ namespace lumihull::calib {
 /// region. `add` may be called by any number of threads; the key does not depend on the order.
 class LUMIHULL_API InkSamples {
  public:
-  /// photo: 3 or 4 channels, sRGB (Error{invalid_argument}: grey). Ink: pixels well inside of dark circles that were measured. Around: pixels of the
-  /// paper between the circles, and everything that is a pitch away from all that was found or refused (targets that
-  /// were overlooked there are few against the rest). Designs of squares have no ink to learn from: they add nothing.
+  /// photo: 3 or 4 channels, sRGB (Error{invalid_argument}: grey). Ink: pixels well inside of dark circles that were
+  /// measured. Around: paper between the circles, and everything that is a pitch away from all that was found or refused.
+  /// Designs of squares add nothing.
   void add(const Image& photo, const TargetSet& set, const Detections& found);
 
   std::uint64_t ink_pixels() const noexcept { return ink_.total(); }
 
-  /// A key whose foreground is the ink; k neighbours, at most 20,000 samples of ink and 100,000 of the rest.
+  /// A key whose foreground is the ink; k neighbours, at most 20,000 samples of ink and 100,000 of the rest. Colours that make
+  /// up a larger part of the ink than of the rest are no samples of the rest: ink may stand there, too.
   /// Errors: degenerate (fewer than 1000 pixels of ink: no target, or only small ones).
   ColorKey train(int k, Job& job) const;
 
