@@ -109,11 +109,12 @@ ColorKey InkSamples::train(int k, Job& job) const {
   const auto cell = [](Rgb c) {
     return std::size_t(c[0] >> 3) << 10 | std::size_t(c[1] >> 3) << 5 | std::size_t(c[2] >> 3);
   };
+  const double all_ink = double(ink_.total()), all_around = double(around_.total());
   const std::vector<ColorCount> ink = ink_.counts();
   std::vector<ColorCount> around = around_.counts();
   std::vector<double> balance(std::size_t(1) << 15);
-  for (const ColorCount& c : ink) balance[cell(c.color)] += double(c.count) / double(ink_.total());
-  for (const ColorCount& c : around) balance[cell(c.color)] -= double(c.count) / double(around_.total());
+  for (const ColorCount& c : ink) balance[cell(c.color)] += double(c.count) / all_ink;
+  for (const ColorCount& c : around) balance[cell(c.color)] -= double(c.count) / all_around;
   std::erase_if(around, [&](const ColorCount& c) { return balance[cell(c.color)] > 0; });
   return ColorKey::train(subsample(around, kAroundSamples), subsample(ink, kInkSamples), k, job);
 }
