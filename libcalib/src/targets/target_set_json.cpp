@@ -1,5 +1,6 @@
 // Target sets on disk: "lumihull-targets", version 1. Fields are called as in the structs.
 #include <lumihull/internal/json.h>
+#include <lumihull/internal/pose_json.h>
 
 #include <initializer_list>
 
@@ -10,6 +11,8 @@ namespace {
 
 using lumihull::internal::Json;
 using lumihull::internal::JsonReader;
+using lumihull::internal::print_pose;
+using lumihull::internal::read_pose;
 
 constexpr const char* kFormat = "lumihull-targets";
 constexpr std::int64_t kVersion = 1;
@@ -69,27 +72,6 @@ Json print_design(const TargetDesign& design) {
   return json;
 }
 
-Pose read_pose(const JsonReader& json) {
-  know_fields(json, {"q", "t"});
-  const JsonReader q = json.at("q"), t = json.at("t");
-  if (q.array_size(4) != 4) q.fail("four numbers w, x, y, z");
-  if (t.array_size(3) != 3) t.fail("three numbers");
-  Pose pose;
-  pose.rotation =
-      Eigen::Quaterniond(q.at(0).number(-2, 2), q.at(1).number(-2, 2), q.at(2).number(-2, 2), q.at(3).number(-2, 2));
-  if (std::abs(pose.rotation.norm() - 1) > 1e-6) q.fail("a quaternion of length 1");
-  // Normalising what is already normalised to rounding would change the last digit at each round trip.
-  if (std::abs(pose.rotation.norm() - 1) > 1e-14) pose.rotation.normalize();
-  for (std::size_t k = 0; k < 3; ++k) pose.translation[Eigen::Index(k)] = t.at(k).number();
-  return pose;
-}
-
-Json print_pose(const Pose& pose) {
-  const auto& q = pose.rotation;
-  const auto& t = pose.translation;
-  return {{"q", {q.w(), q.x(), q.y(), q.z()}}, {"t", {t.x(), t.y(), t.z()}}};
-}
-
 Board read_board(const JsonReader& json) {
   know_fields(json, {"name", "targets"});
   Board board;
@@ -99,8 +81,10 @@ Board read_board(const JsonReader& json) {
   for (std::size_t i = 0; i < n; ++i) {
     const JsonReader target = targets.at(i);
     know_fields(target, {"design", "id", "board_from_target"});
-    board.targets.push_back({int(target.at("design").integer(0, INT32_MAX)), int(target.at("id").integer(0, INT32_MAX)),
-                             read_pose(target.at("board_from_target"))});
+    const JsonReader place = target.at("board_from_target");
+    know_fields(place, {"q", "t"});
+    board.targets.push_back(
+        {int(target.at("design").integer(0, INT32_MAX)), int(target.at("id").integer(0, INT32_MAX)), read_pose(place)});
   }
   return board;
 }

@@ -1,6 +1,7 @@
 #include "capture_json.h"
 
 #include <lumihull/internal/camera_json.h>
+#include <lumihull/internal/pose_json.h>
 
 #include <set>
 
@@ -187,17 +188,7 @@ void parse_cameras_json(std::string_view text, const std::string& name, Capture&
     const JsonReader json = poses.at(item.key());
     const auto shot = by_name.find(item.key());
     if (shot == by_name.end()) json.fail("the name of a shot of capture.json");
-    const JsonReader q = json.at("q"), t = json.at("t");
-    if (q.array_size(4) != 4) q.fail("four numbers w, x, y, z");
-    if (t.array_size(3) != 3) t.fail("three numbers");
-    Pose pose;
-    pose.rotation =
-        Eigen::Quaterniond(q.at(0).number(-2, 2), q.at(1).number(-2, 2), q.at(2).number(-2, 2), q.at(3).number(-2, 2));
-    if (std::abs(pose.rotation.norm() - 1) > 1e-6) q.fail("a quaternion of length 1");
-    // Normalising what is already normalised to rounding would change the last digit at each round trip.
-    if (std::abs(pose.rotation.norm() - 1) > 1e-14) pose.rotation.normalize();
-    for (std::size_t k = 0; k < 3; ++k) pose.translation[Eigen::Index(k)] = t.at(k).number();
-    shot->second->cam_from_world = pose;
+    shot->second->cam_from_world = read_pose(json);
   }
 }
 
@@ -207,9 +198,7 @@ std::string print_cameras_json(const Capture& capture, const std::string& name) 
   Json poses = Json::object();
   for (const Shot& shot : capture.shots) {
     if (!shot.cam_from_world) continue;
-    const auto& q = shot.cam_from_world->rotation;
-    const auto& t = shot.cam_from_world->translation;
-    poses[shot.name] = {{"q", {q.w(), q.x(), q.y(), q.z()}}, {"t", {t.x(), t.y(), t.z()}}};
+    poses[shot.name] = print_pose(*shot.cam_from_world);
   }
   const Json json{{"format", "lumihull-cameras"}, {"version", 1}, {"cameras", cameras}, {"cam_from_world", poses}};
   return print_json(json, name);
