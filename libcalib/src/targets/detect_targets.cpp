@@ -144,6 +144,10 @@ struct TargetDetector::Impl {
 TargetDetector::TargetDetector(TargetSet set, DetectOptions options) {
   set.validate();
   options.validate();
+  for (const TargetDesign& d : set.designs)
+    if (d.solid_light)
+      throw Error(ErrorCode::unsupported,
+                  "light circles without rings can be printed, but are not found yet: print rings", d.family.name());
   impl_ = std::make_unique<const Impl>(std::move(set), std::move(options));
 }
 TargetDetector::TargetDetector(TargetDetector&&) noexcept = default;

@@ -297,13 +297,12 @@ TEST(Detect, NothingInClutter) {
     EXPECT_TRUE(detector.detect(test::decoy(seed), job).targets.empty()) << "picture " << seed;
 }
 
-TEST(Detect, SolidLightCircles) {
+TEST(Detect, SolidLightCirclesAreRefusedInWords) {
   Wall wall;
   wall.designs[0].solid_light = true;
-  wall.add(wall.designs[0].family.ids()[20], {320, 240}, 20);
-  const Image photo = wall.photo();
-  const Detections found = detect(photo, set_of(wall.designs));
-  EXPECT_LE(found.targets.size(), 1u);
+  const Error error = test::expect_error([&] { TargetDetector{set_of(wall.designs)}; });
+  EXPECT_EQ(error.code(), ErrorCode::unsupported);
+  EXPECT_THAT(error.message(), testing::HasSubstr("print rings"));
 }
 
 TEST(Detect, AnswerIsIndependentOfThreadsAndPixelType) {
