@@ -28,32 +28,6 @@ std::string base64(std::string_view bytes) {
 
 }  // namespace
 
-std::string html_escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += std::uint8_t(c) < 32 && c != '\n' ? ' ' : c;
-    }
-  }
-  return out;
-}
-
 std::string figure(const Image& picture, const std::string& caption) {
   const std::string jpeg = encode_jpeg(picture.channels() == 4 ? composited(picture, kBehind) : picture, kJpegQuality);
   return "<figure><img loading=\"lazy\" width=\"" + std::to_string(picture.width()) + "\" height=\"" +

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <lumihull/base/image.h>
+#include <lumihull/internal/html.h>
 
 #include <cstdint>
 #include <string>
@@ -8,8 +9,7 @@
 
 namespace lumihull::slf {
 
-/// Text for HTML's content and attributes: & < > " ' escaped, control characters replaced.
-std::string html_escaped(std::string_view text);
+using lumihull::internal::html_escaped;
 
 /// A picture with words below it, embedded as JPEG; what is transparent in it becomes grey (alpha takes PNG, many times
 /// as large).

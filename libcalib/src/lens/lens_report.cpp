@@ -1,6 +1,7 @@
 // What a calibration found, as one page: tables, and residuals and uncertainty over the picture.
 #include <lumihull/base/error.h>
 #include <lumihull/calib/lens_calibration.h>
+#include <lumihull/internal/html.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +12,7 @@
 namespace lumihull::calib {
 namespace {
 
-using lens::html_text;
+using lumihull::internal::html_escaped;
 using lens::number;
 using lens::SvgFigure;
 
@@ -156,7 +157,7 @@ std::string uncertainty_map(const LensCalibration& c) {
 }
 
 std::string row(const std::string& name, const std::string& value) {
-  return "<tr><td>" + html_text(name) + "</td><td>" + html_text(value) + "</td></tr>\n";
+  return "<tr><td>" + html_escaped(name) + "</td><td>" + html_escaped(value) + "</td></tr>\n";
 }
 
 }  // namespace
@@ -178,13 +179,13 @@ std::string lens_report_html(const LensCalibration& c, std::span<const BoardView
   std::string page =
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
       "content=\"width=device-width\"><title>" +
-      html_text(title) +
+      html_escaped(title) +
       "</title><style>body{font:15px/1.5 system-ui,sans-serif;max-width:800px;margin:2em auto;padding:0 "
       "1em;color:#222;background:#fff}td{padding:.1em 1.5em .1em 0}td:last-child{font-variant-numeric:tabular-nums}"
       ".problem{border-left:4px solid #d9622b;padding-left:.8em}@media "
       "(prefers-color-scheme:dark){body{color:#e8e8e8;background:#15171c}}" +
-      SvgFigure::style_sheet() + "</style></head><body>\n<h1>" + html_text(title) + "</h1>\n";
-  for (const std::string& problem : c.problems) page += "<p class=\"problem\">" + html_text(problem) + "</p>\n";
+      SvgFigure::style_sheet() + "</style></head><body>\n<h1>" + html_escaped(title) + "</h1>\n";
+  for (const std::string& problem : c.problems) page += "<p class=\"problem\">" + html_escaped(problem) + "</p>\n";
   page += "<table>\n";
   page += row("picture", std::to_string(c.camera.width) + " x " + std::to_string(c.camera.height) + " px");
   const Camera& k = c.camera;

@@ -1,5 +1,7 @@
 #include "svg_figure.h"
 
+#include <lumihull/internal/html.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -21,27 +23,6 @@ std::string painted(std::string_view style) {
 }
 
 }  // namespace
-
-std::string html_text(std::string_view text) {
-  std::string out;
-  for (const char c : text) switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += std::uint8_t(c) < 32 || c == 127 ? ' ' : c;
-    }
-  return out;
-}
 
 std::string number(const char* format, double value) {
   if (!std::isfinite(value)) return "–";
@@ -83,9 +64,9 @@ void SvgFigure::axes(double x0, double x1, double y0, double y1, const std::stri
              "\" text-anchor=\"end\">" + number("%.6g", i * dy + 0.0) + "</text>\n";
   }
   body_ += "<text class=\"small\" x=\"" + px(0.5 * (kLeft + width_ - kRight)) + "\" y=\"" + px(height_ - 10) +
-           "\" text-anchor=\"middle\">" + html_text(x_label) +
+           "\" text-anchor=\"middle\">" + lumihull::internal::html_escaped(x_label) +
            "</text>\n<text class=\"small\" transform=\"translate(14 " + px(0.5 * (kTop + height_ - kBottom)) +
-           ") rotate(-90)\" text-anchor=\"middle\">" + html_text(y_label) + "</text>\n";
+           ") rotate(-90)\" text-anchor=\"middle\">" + lumihull::internal::html_escaped(y_label) + "</text>\n";
 }
 
 void SvgFigure::line(double x0, double y0, double x1, double y1, std::string_view style) {
@@ -106,16 +87,16 @@ void SvgFigure::box(double x0, double y0, double x1, double y1, std::string_view
 
 void SvgFigure::text(double x, double y, const std::string& words, std::string_view style, const char* anchor) {
   body_ += "<text class=\"" + std::string(style) + "\" x=\"" + px(x_of(x)) + "\" y=\"" + px(y_of(y) + 4) +
-           "\" text-anchor=\"" + anchor + "\">" + html_text(words) + "</text>\n";
+           "\" text-anchor=\"" + anchor + "\">" + lumihull::internal::html_escaped(words) + "</text>\n";
 }
 
 void SvgFigure::note(const std::string& words) { note_ = words; }
 
 std::string SvgFigure::str() const {
   return "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + px(width_) + " " + px(height_) + "\" width=\"" +
-         px(width_) + "\" height=\"" + px(height_) + "\" role=\"img\"><title>" + html_text(title_) + "</title>\n" +
-         "<text class=\"heading\" x=\"" + px(kLeft) + "\" y=\"18\">" + html_text(title_) + "</text>\n" +
-         "<text class=\"small\" x=\"" + px(kLeft) + "\" y=\"36\">" + html_text(note_) + "</text>\n" + body_ +
+         px(width_) + "\" height=\"" + px(height_) + "\" role=\"img\"><title>" + lumihull::internal::html_escaped(title_) + "</title>\n" +
+         "<text class=\"heading\" x=\"" + px(kLeft) + "\" y=\"18\">" + lumihull::internal::html_escaped(title_) + "</text>\n" +
+         "<text class=\"small\" x=\"" + px(kLeft) + "\" y=\"36\">" + lumihull::internal::html_escaped(note_) + "</text>\n" + body_ +
          "</svg>\n";
 }
 

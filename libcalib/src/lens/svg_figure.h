@@ -8,8 +8,6 @@
 
 namespace lumihull::calib::lens {
 
-/// Text for HTML's content: & < > " escaped, control characters replaced.
-std::string html_text(std::string_view text);
 /// printf's format for one number; a dash where it is not finite.
 std::string number(const char* format, double value);
 
