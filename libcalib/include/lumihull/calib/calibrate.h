@@ -42,7 +42,7 @@ struct LUMIHULL_API CalibrateOptions {
   bool rig = false;                    ///< several cameras are fixed to each other; `shot` says what belongs together
   /// Photographs that the model of the targets is made from, the rest is placed by resection (paper, 3.1); 0: all.
   int model_photos = 150;
-  double outlier_sigma = 4;  ///< observations farther off, in standard deviations (2-D), are removed and named
+  double outlier_sigma = 4;    ///< observations farther off, in standard deviations (2-D), are removed and named
   std::vector<ScaleBar> bars;  ///< body_a, body_b: indices into `bodies_of(set, …)`'s answer
   bool free_print_scale = false;
   bool cross_validate = true;
@@ -66,11 +66,11 @@ struct Removed {
   };
   Kind kind = Kind::observation;
   Why why = Why::outlier;
-  int photo = -1;        ///< index into the photographs
-  int body = -1;         ///< index into Calibration::bodies
+  int photo = -1;  ///< index into the photographs
+  int body = -1;   ///< index into Calibration::bodies
   int design = -1, id = -1, feature = -1;
-  double off_px = 0;     ///< how far from where it should be, where that is known
-  std::string text;      ///< one line that names photograph and target and says what it means
+  double off_px = 0;  ///< how far from where it should be, where that is known
+  std::string text;   ///< one line that names photograph and target and says what it means
 };
 
 struct CalibratedPhoto {
@@ -86,29 +86,29 @@ struct CalibratedPhoto {
 
 /// A target, or a board of targets, as it was solved.
 struct CalibratedBody {
-  std::string name;        ///< "matrix5x5 17", or the board's name
-  int board = -1;          ///< index into TargetSet::boards
+  std::string name;          ///< "matrix5x5 17", or the board's name
+  int board = -1;            ///< index into TargetSet::boards
   int design = -1, id = -1;  ///< of a target that is a body of its own
   /// Which of a body's points is which: of point k, target features[k].design, id, feature.
   struct PointName {
     int design = 0, id = 0, feature = 0;
   };
   std::vector<PointName> features;
-  AdjustedBody body;       ///< printed points, pose, bend
+  AdjustedBody body;  ///< printed points, pose, bend
   bool placed = false;
   std::vector<Eigen::Vector3d> points;             ///< in the world, m
   std::vector<Eigen::Matrix3d> point_covariances;  ///< m²
-  int photos = 0;          ///< that count it
+  int photos = 0;                                  ///< that count it
   double rms_px = 0;
 };
 
 /// One observation and what is left of it: for reports and tracks.
 struct CalibrationResidual {
   int photo = 0, body = 0, point = 0;
-  Eigen::Vector2d pixel{0, 0};      ///< measured
-  Eigen::Vector2d error{0, 0};      ///< measured less predicted, px; not a number where that can't be told
-  double sigmas = 0;                ///< sqrt(rᵀ Σ⁻¹ r) / sigma0
-  double size_px = 0;               ///< circles: minor axis as seen, px; 0 for corners
+  Eigen::Vector2d pixel{0, 0};  ///< measured
+  Eigen::Vector2d error{0, 0};  ///< measured less predicted, px; not a number where that can't be told
+  double sigmas = 0;            ///< sqrt(rᵀ Σ⁻¹ r) / sigma0
+  double size_px = 0;           ///< circles: minor axis as seen, px; 0 for corners
   bool removed = false;
 };
 
@@ -120,11 +120,11 @@ struct Calibration {
   std::vector<CalibratedBody> bodies;
   std::vector<CalibrationResidual> residuals;  ///< of all observations in photographs with a pose, removed ones too
   std::vector<Removed> removed;
-  double rms_px = 0;      ///< sqrt(Σ (dx² + dy²) / observations that count)
-  double share = 0;       ///< of the observations in placed photographs that count
-  double sigma0 = 0;      ///< residuals over their covariances: about 1 where these are right
+  double rms_px = 0;  ///< sqrt(Σ (dx² + dy²) / observations that count)
+  double share = 0;   ///< of the observations in placed photographs that count
+  double sigma0 = 0;  ///< residuals over their covariances: about 1 where these are right
   Eigen::Vector2d print_scale{1, 1};
-  int parts = 0;          ///< connected parts of the photographs
+  int parts = 0;  ///< connected parts of the photographs
   /// Two halves of the photographs, each adjusted alone, aligned: RMS distance of the points, m; and of these distances
   /// over what the covariances expect, about 1. Negative: too few photographs.
   double cross_validation_m = -1, cross_validation_sigma = -1;
@@ -138,12 +138,12 @@ struct Calibration {
 /// The bodies that a set and what was found make: its boards, or each target of its own. By board; by design and id.
 LUMIHULL_API std::vector<CalibratedBody> bodies_of(const TargetSet& set, std::span<const PhotoTargets> photos);
 
-/// From what was found in an unordered set of photographs to a pose for each of them and the targets' places: no start is
-/// needed. Planar poses with both mirror solutions, a chain of photographs and bodies that grows from the pair that is
-/// surest, adjustments in between, data snooping, resection of the rest (paper, section 3.1).
+/// From what was found in an unordered set of photographs to a pose for each of them and the targets' places: no start
+/// is needed. Planar poses with both mirror solutions, a chain of photographs and bodies that grows from the pair that
+/// is surest, adjustments in between, data snooping, resection of the rest (paper, section 3.1).
 ///
-/// World: metres, the frame of the first placed body of most observations. Errors: invalid_argument; degenerate (nothing
-/// can be placed: says why); cancelled.
+/// World: metres, the frame of the first placed body of most observations. Errors: invalid_argument; degenerate
+/// (nothing can be placed: says why); cancelled.
 LUMIHULL_API Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets> photos,
                                            std::span<const CameraStart> cameras, const CalibrateOptions& options,
                                            Job& job);
