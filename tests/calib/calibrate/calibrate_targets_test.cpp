@@ -1,0 +1,243 @@
+// From nothing to poses: simulated detections of known truth, and what goes wrong in real captures.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <lumihull/base/error.h>
+#include <lumihull/calib/calibrate.h>
+
+#include <algorithm>
+#include <random>
+
+#include "simulated_capture.h"
+
+namespace lumihull::calib {
+namespace {
+
+using test::pose_errors;
+using test::simulate_capture;
+using test::SimulatedCapture;
+using test::SimulatedOptions;
+using testing::HasSubstr;
+
+Calibration calibrate(const SimulatedCapture& capture, bool known = true, CalibrateOptions options = {},
+                      unsigned threads = 0) {
+  Job job({}, threads);
+  if (known) options.refine_intrinsics = false;
+  return calibrate_targets(capture.set, capture.photos, capture.cameras(known), options, job);
+}
+
+std::vector<const Removed*> removed_as(const Calibration& c, Removed::Kind kind, Removed::Why why) {
+  std::vector<const Removed*> found;
+  for (const Removed& r : c.removed)
+    if (r.kind == kind && r.why == why) found.push_back(&r);
+  return found;
+}
+
+TEST(CalibrateTargets, PlacesEveryPhotographOfAnEnclosure) {
+  for (const double radius : {0.8, 1.5, 2.7}) {
+    SimulatedOptions o;
+    o.radius_m = radius;
+    const SimulatedCapture capture = simulate_capture(o);
+    for (const PhotoTargets& p : capture.photos) ASSERT_GE(p.targets.size(), 5u) << p.name << " at " << radius;
+    const Calibration c = calibrate(capture);
+    EXPECT_EQ(c.parts, 1);
+    EXPECT_EQ(pose_errors(capture, c).photos, o.photos);
+    EXPECT_LT(pose_errors(capture, c).centre_m, 1e-4) << radius;
+    EXPECT_NEAR(c.rms_px, 0.05 * std::sqrt(2.0), 0.01);
+    EXPECT_NEAR(c.sigma0, 1, 0.05);
+    EXPECT_GT(c.share, 0.995);  // 4 sigma of a Rayleigh: 3.4 in 10,000
+    EXPECT_NEAR(c.cross_validation_sigma, 1, 0.4);
+    EXPECT_THAT(c.verdict, HasSubstr("Good"));
+  }
+}
+
+TEST(CalibrateTargets, FindsTheCameraToo) {
+  const SimulatedCapture capture = simulate_capture({});
+  const Calibration c = calibrate(capture, false);
+  EXPECT_EQ(pose_errors(capture, c).photos, 60);
+  EXPECT_LT(pose_errors(capture, c).centre_m, 3e-4);
+  const double sd = std::sqrt(c.camera_covariances[0](0, 0));
+  EXPECT_GT(sd, 0);
+  EXPECT_LT(std::abs(c.cameras[0].f - capture.camera.f), 5 * sd);
+  EXPECT_NEAR(c.cameras[0].k1, capture.camera.k1, 0.002);
+}
+
+TEST(CalibrateTargets, SmallTagsThatCanBeTiltedEitherWay) {
+  SimulatedOptions o;
+  o.family = "aruco:6x6_250:35mm";
+  o.floor_only = true;
+  o.targets = 20;
+  o.photos = 22;
+  o.radius_m = 1.2;
+  o.noise_px = 0.1;
+  const SimulatedCapture capture = simulate_capture(o);
+  const Calibration c = calibrate(capture, false);
+  EXPECT_EQ(pose_errors(capture, c).photos, o.photos);
+  EXPECT_LT(pose_errors(capture, c).centre_m, 0.02);
+  EXPECT_LT(c.rms_px, 0.15);
+  EXPECT_LT(c.bend_m, 2e-3);
+  // z stands up from the sheet.
+  for (const CalibratedPhoto& p : c.photos) EXPECT_GT(p.cam_from_world->center().z(), 0);
+}
+
+TEST(CalibrateTargets, WrongIdsAreNamedAndDoNotMatter) {
+  SimulatedCapture capture = simulate_capture({});
+  const double clean = pose_errors(capture, calibrate(capture)).centre_m;
+  std::mt19937_64 random(7);
+  std::vector<std::pair<int, int>> wrong;  // (photograph, id as read)
+  for (std::size_t i = 0; i < capture.photos.size(); ++i)
+    for (Detection& d : capture.photos[i].targets) {
+      if (random() % 20) continue;
+      const int other = int(random() % 24);
+      const bool there = std::any_of(capture.photos[i].targets.begin(), capture.photos[i].targets.end(),
+                                     [&](const Detection& x) { return x.id == other; });
+      if (there) continue;
+      d.id = other;
+      wrong.emplace_back(int(i), other);
+    }
+  ASSERT_GT(wrong.size(), 15u);
+  const Calibration c = calibrate(capture);
+  EXPECT_EQ(pose_errors(capture, c).photos, 60);
+  EXPECT_LT(pose_errors(capture, c).centre_m, 1.02 * clean + 2e-6);
+  std::vector<std::pair<int, int>> named;
+  for (const Removed* r : removed_as(c, Removed::Kind::detection, Removed::Why::wrong_id)) named.emplace_back(r->photo, r->id);
+  std::sort(named.begin(), named.end());
+  std::sort(wrong.begin(), wrong.end());
+  EXPECT_EQ(named, wrong);
+}
+
+TEST(CalibrateTargets, ATargetThatWasMovedHalfWayIsNamed) {
+  SimulatedCapture capture = simulate_capture({});
+  const double clean = pose_errors(capture, calibrate(capture)).centre_m;
+  Pose moved = capture.world_from_target[4];
+  moved.translation += Eigen::Vector3d(0.02, -0.03, 0.04);
+  for (std::size_t i = 30; i < 60; ++i)
+    for (Detection& d : capture.photos[i].targets)
+      if (d.id == 4)
+        if (auto now = test::see_target(capture.set, 4, moved, {capture.camera, capture.cam_from_world[i]}, 0.05, i)) d = *now;
+  const Calibration c = calibrate(capture);
+  EXPECT_LT(pose_errors(capture, c).centre_m, 1.02 * clean + 2e-6);
+  const auto named = removed_as(c, Removed::Kind::target, Removed::Why::moved);
+  ASSERT_EQ(named.size(), 1u);
+  EXPECT_EQ(named[0]->id, 4);
+  EXPECT_GE(named[0]->photo, 28);
+  EXPECT_LE(named[0]->photo, 33);
+  EXPECT_THAT(named[0]->text, HasSubstr("53.9 mm"));
+}
+
+TEST(CalibrateTargets, TwoTargetsWithOneIdAreNamed) {
+  SimulatedCapture capture = simulate_capture({});
+  // Photographs show the one or the other in turn: where both are seen a detector takes neither.
+  for (std::size_t i = 0; i < 60; ++i)
+    for (Detection& d : capture.photos[i].targets)
+      if (d.id == 5 && i % 3 == 0) {
+        Pose other = capture.world_from_target[5];
+        other.translation.z() += 0.3;
+        if (auto now = test::see_target(capture.set, 5, other, {capture.camera, capture.cam_from_world[i]}, 0.05, i)) d = *now;
+      }
+  const Calibration c = calibrate(capture);
+  const auto named = removed_as(c, Removed::Kind::target, Removed::Why::same_id);
+  ASSERT_EQ(named.size(), 1u);
+  EXPECT_EQ(named[0]->id, 5);
+  EXPECT_EQ(pose_errors(capture, c).photos, 60);
+}
+
+TEST(CalibrateTargets, PhotographsOfAnotherSceneAndInAMirrorAreNamed) {
+  SimulatedCapture capture = simulate_capture({});
+  SimulatedOptions o;
+  o.seed = 99;  // the same ids, lying otherwise
+  capture.photos[10].targets = simulate_capture(o).photos[12].targets;
+  for (Detection& d : capture.photos[20].targets) {
+    Eigen::Matrix3d flip = Eigen::Matrix3d::Identity();
+    flip(0, 0) = -1, flip(0, 2) = capture.camera.width;
+    d.pixel_from_target = flip * d.pixel_from_target;
+    for (Feature& f : d.features) f.pixel.x() = capture.camera.width - f.pixel.x();
+  }
+  const Calibration c = calibrate(capture);
+  EXPECT_EQ(pose_errors(capture, c).photos, 58);
+  const auto scene = removed_as(c, Removed::Kind::photo, Removed::Why::other_scene);
+  ASSERT_EQ(scene.size(), 1u);
+  EXPECT_EQ(scene[0]->photo, 10);
+  const auto mirror = removed_as(c, Removed::Kind::photo, Removed::Why::mirrored);
+  ASSERT_EQ(mirror.size(), 1u);
+  EXPECT_EQ(mirror[0]->photo, 20);
+}
+
+TEST(CalibrateTargets, PartsThatShareNothingAreBothKept) {
+  SimulatedCapture capture = simulate_capture({});
+  for (std::size_t i = 0; i < 60; ++i)
+    std::erase_if(capture.photos[i].targets, [&](const Detection& d) { return (d.id % 2 == 0) != (i < 40); });
+  const Calibration c = calibrate(capture);
+  EXPECT_EQ(c.parts, 2);
+  for (std::size_t i = 0; i < 60; ++i) {
+    EXPECT_EQ(c.photos[i].part, i < 40 ? 0 : 1) << i;
+    EXPECT_TRUE(c.photos[i].cam_from_world.has_value()) << i;
+  }
+  EXPECT_EQ(removed_as(c, Removed::Kind::photo, Removed::Why::not_connected).size(), 20u);
+  EXPECT_THAT(c.verdict, HasSubstr("20 of 60 photographs have no pose"));
+}
+
+TEST(CalibrateTargets, OrderAndThreadsDoNotMatter) {
+  SimulatedOptions o;
+  o.photos = 24;
+  SimulatedCapture capture = simulate_capture(o);
+  const Calibration one = calibrate(capture, true, {}, 1), two = calibrate(capture, true, {}, 2);
+  for (std::size_t i = 0; i < 24; ++i) {
+    EXPECT_EQ(one.photos[i].cam_from_world->translation, two.photos[i].cam_from_world->translation);
+    EXPECT_EQ(one.photos[i].cam_from_world->rotation.coeffs(), two.photos[i].cam_from_world->rotation.coeffs());
+  }
+  SimulatedCapture turned = capture;
+  std::reverse(turned.photos.begin(), turned.photos.end());
+  const Calibration back = calibrate(turned);
+  for (std::size_t i = 0; i < 24; ++i)
+    EXPECT_LT((one.photos[i].cam_from_world->center() - back.photos[23 - i].cam_from_world->center()).norm(), 1e-7);
+}
+
+TEST(CalibrateTargets, TheRestIsPlacedByResection) {
+  SimulatedCapture capture = simulate_capture({});
+  CalibrateOptions options;
+  options.model_photos = 20;
+  const Calibration c = calibrate(capture, true, options);
+  EXPECT_EQ(pose_errors(capture, c).photos, 60);
+  EXPECT_LT(pose_errors(capture, c).centre_m, 2e-4);
+  int in_model = 0;
+  for (const CalibratedPhoto& p : c.photos) {
+    in_model += p.in_model;
+    EXPECT_FALSE(p.reason.empty());
+    EXPECT_GT(p.covariance.trace(), 0);
+  }
+  EXPECT_EQ(in_model, 20);
+}
+
+TEST(CalibrateTargets, FaultsAreClear) {
+  SimulatedOptions o;
+  o.photos = 6;
+  SimulatedCapture capture = simulate_capture(o);
+  Job job;
+  const auto run = [&] { calibrate_targets(capture.set, capture.photos, capture.cameras(true), {}, job); };
+  capture.photos[0].camera = 3;
+  EXPECT_THROW(run(), Error);
+  capture.photos[0].camera = 0;
+  const auto kept = capture.photos[2].targets;
+  capture.photos[2].targets[0].features[0].pixel.x() = std::nan("");
+  EXPECT_THROW(run(), Error);
+  capture.photos[2].targets = kept;
+  EXPECT_NO_THROW(run());
+  for (PhotoTargets& p : capture.photos) p.targets.clear();
+  try {
+    run();
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::degenerate);
+    EXPECT_THAT(e.message(), HasSubstr("no target of the set was found"));
+  }
+  // One photograph is not much, but its targets have places.
+  SimulatedOptions one;
+  one.photos = 1;
+  capture = simulate_capture(one);
+  const Calibration c = calibrate(capture);
+  EXPECT_EQ(pose_errors(capture, c).photos, 1);
+  EXPECT_FALSE(c.warnings.empty());
+}
+
+}  // namespace
+}  // namespace lumihull::calib
