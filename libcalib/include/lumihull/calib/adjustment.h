@@ -49,11 +49,12 @@ struct AdjustedBody {
   std::vector<BodyPoint> points;
   BodyModel model = BodyModel::rigid;
   Pose world_from_body;
-  Eigen::Vector3d bend{0, 0, 0};            ///< a, b, c of BodyModel::bending, 1/m
-  std::vector<Eigen::Vector3d> free_places; ///< BodyModel::free: where the points are in the world; empty: as printed
+  Eigen::Vector3d bend{0, 0, 0};             ///< a, b, c of BodyModel::bending, 1/m
+  std::vector<Eigen::Vector3d> free_places;  ///< BodyModel::free: where the points are in the world; empty: as printed
 
-  /// Where a point is in the world.
-  Eigen::Vector3d point(std::size_t index) const;
+  /// Where a point is in the world: of a rigid or bending body by its pose, bend and the print scale; of a free one its
+  /// own place, as printed where `free_places` is empty.
+  LUMIHULL_API Eigen::Vector3d point(std::size_t index, const Eigen::Vector2d& print_scale = {1, 1}) const;
 };
 
 struct Observation {
@@ -84,9 +85,9 @@ struct Adjustment {
 struct LUMIHULL_API AdjustOptions {
   /// Cauchy loss with this scale, in standard deviations (2-D); 0: plain least squares.
   double robust_sigma = 0;
-  double bend_sigma = 1;      ///< 1/m, a priori: 0.5 m radius of curvature
-  int max_iterations = 50;    ///< 1 … 1000
-  double tolerance = 1e-10;   ///< ends where a step changes the objective by less than this share
+  double bend_sigma = 1;     ///< 1/m, a priori: 0.5 m radius of curvature
+  int max_iterations = 50;   ///< 1 … 1000
+  double tolerance = 1e-10;  ///< ends where a step changes the objective by less than this share
   bool covariances = true;
 
   void validate() const;
@@ -94,11 +95,12 @@ struct LUMIHULL_API AdjustOptions {
 
 struct AdjustResult {
   Adjustment adjusted;
-  /// Measured less predicted, px, of each observation; not a number where it can't be predicted (behind the camera).
+  /// Measured less predicted, px, of each observation; not a number where it can't be predicted. Observations that
+  /// can't be predicted at the start (behind the camera, beyond the lens's domain) do not count.
   std::vector<Eigen::Vector2d> residuals;
   /// Σ rᵀ Σ⁻¹ r over both coordinates (robust: Σ of the loss), bars and bends included, before and after.
   double start_cost = 0, cost = 0;
-  double rms_px = 0;  ///< sqrt(Σ (dx² + dy²) / observations)
+  double rms_px = 0;  ///< sqrt(Σ (dx² + dy²) / observations that count)
   double sigma0 = 0;  ///< sqrt(Σ rᵀ Σ⁻¹ r / redundancy): about 1 where the covariances are right
   std::int64_t redundancy = 0;
   int iterations = 0;
@@ -111,6 +113,7 @@ struct AdjustResult {
   std::vector<Eigen::Matrix<double, 6, 6>> shot_covariances;
   std::vector<Eigen::Matrix<double, kIntrinsics, kIntrinsics>> camera_covariances;
   std::vector<Eigen::Matrix<double, 6, 6>> rig_covariances;
+  Eigen::Matrix2d print_covariance = Eigen::Matrix2d::Zero();
   std::vector<std::vector<Eigen::Matrix3d>> point_covariances;  ///< of each body's points in the world, m²
 };
 
@@ -120,8 +123,12 @@ struct AdjustResult {
 /// free and damped while iterating: nothing is held fixed, the answer is turned back to where the bodies' points were.
 /// The same bytes for any number of threads.
 ///
-/// Errors: invalid_argument (indices, sizes, not finite), bad_input (camera), degenerate (a shot or body that too little
-/// is seen of: named; nothing fixes the scale though all bodies are free), cancelled.
+/// Where nothing fixes the scale (all bodies free, no bars, no cameras fixed apart on the rig) it is the start's: that
+/// at which the bodies' points lie closest to where they were. Points of free bodies that are not observed stay where
+/// they are.
+///
+/// Errors: invalid_argument (indices, sizes, not finite), bad_input (camera), degenerate (a shot, body or point that
+/// too little is seen of, parts of the photographs without a body in common: named), cancelled.
 LUMIHULL_API AdjustResult adjust(const Adjustment& problem, const AdjustOptions& options, Job& job);
 
 }  // namespace lumihull::calib
