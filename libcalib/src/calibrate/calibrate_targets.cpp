@@ -92,8 +92,8 @@ std::optional<Settled> settle_robustly(Network& n, int part, int rounds, Job& jo
   return settled;
 }
 
-/// The largest part gets number 0.
-void number_parts(Network& n, int parts) {
+/// The largest part gets number 0; a single photograph beside it is no part. Returns how many there are.
+int number_parts(Network& n, int parts) {
   std::vector<int> photos(std::size_t(parts), 0), order(std::size_t(parts), 0), number(std::size_t(parts), 0);
   for (const int p : n.photo_part)
     if (p >= 0) ++photos[std::size_t(p)];
@@ -101,10 +101,22 @@ void number_parts(Network& n, int parts) {
   std::stable_sort(order.begin(), order.end(),
                    [&](int a, int b) { return photos[std::size_t(a)] > photos[std::size_t(b)]; });
   for (int i = 0; i < parts; ++i) number[std::size_t(order[std::size_t(i)])] = i;
-  for (int& p : n.photo_part)
+  int kept = 1;
+  for (int i = 1; i < parts; ++i) {
+    const std::size_t part = std::size_t(order[std::size_t(i)]);
+    number[part] = photos[part] > 1 ? kept++ : -1;
+  }
+  for (std::size_t i = 0; i < n.photos.size(); ++i) {
+    int& p = n.photo_part[i];
     if (p >= 0) p = number[std::size_t(p)];
-  for (int& p : n.body_part)
+    if (p < 0) n.cam_from_world[i].reset();
+  }
+  for (std::size_t b = 0; b < n.bodies.size(); ++b) {
+    int& p = n.body_part[b];
     if (p >= 0) p = number[std::size_t(p)];
+    n.bodies[b].placed = p >= 0;
+  }
+  return kept;
 }
 
 /// Adjusts, judges and looks again until nothing changes.
@@ -293,7 +305,7 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
   if (parts == 0)
     throw Error(ErrorCode::degenerate, "no photograph shows a target well enough to say from where it is seen",
                 "targets");
-  number_parts(n, parts);
+  parts = number_parts(n, parts);
   for (int part = parts; part-- > 0;) clean(n, part, options, job);
 
   // The answer proper, on what is left.

@@ -130,7 +130,11 @@ void name_unplaced_photos(Network& n, int part, std::vector<CalibratedPhoto>& ph
     const std::string photo = photo_text(n, int(i));
     Removed::Why why = Removed::Why::too_few;
     std::string text;
-    if (n.photo_part[i] >= 0) {
+    if (placed >= 2) {
+      why = Removed::Why::other_scene;
+      text = photo + " shows " + std::to_string(placed) +
+             " targets of the model, but not as they lie to each other there: another scene, or they were moved";
+    } else if (n.photo_part[i] >= 0) {
       why = Removed::Why::not_connected;
       text = photo + formatted(
                          " belongs to part %d: no chain of shared targets leads from there to the largest part; "
@@ -138,10 +142,6 @@ void name_unplaced_photos(Network& n, int part, std::vector<CalibratedPhoto>& ph
                          n.photo_part[i]);
     } else if (all == 0) {
       text = photo + " shows no target that was found: more light, less blur, or nearer";
-    } else if (placed >= 2) {
-      why = Removed::Why::other_scene;
-      text = photo + " shows " + std::to_string(placed) +
-             " targets of the model, but not as they lie to each other there: another scene, or they were moved";
     } else if (placed == 1) {
       text = photo + " shows one target of the model, too small or too flat to say from where it is seen";
     } else {
@@ -182,12 +182,13 @@ void judge_calibration(Calibration& c, std::span<const PhotoTargets> photos) {
       doubts.push_back("the focal length is weak");
     }
   }
+  std::string rare;
+  int count = 0;
   for (const CalibratedBody& b : c.bodies)
-    if (b.placed && b.photos < 3)
-      c.warnings.push_back((b.board >= 0 ? "board " : "target ") + b.name +
-                           formatted(" is seen in %d photographs only: "
-                                     "nothing checks it",
-                                     b.photos));
+    if (b.placed && b.photos < 3 && ++count <= 5) rare += (count > 1 ? ", " : "") + b.name;
+  if (count > 0)
+    c.warnings.push_back(formatted("%d of the targets are seen in fewer than three photographs, so nothing checks them: ",
+                                   count) + rare + (count > 5 ? ", …" : ""));
   std::string figures = formatted("%zu of %zu photographs placed, %.3f px RMS over %.1f %% of the observations", placed,
                                   photos.size(), c.rms_px, 100 * c.share);
   if (c.cross_validation_m >= 0) figures += formatted(", halves agree to %.3f mm", 1000 * c.cross_validation_m);

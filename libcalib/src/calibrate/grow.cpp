@@ -166,7 +166,7 @@ bool place_body(Network& n, int body, int part, bool last) {
 }  // namespace
 
 double rough_distance(const Network& network, const Sighting& sighting, const Pose& cam_from_body) {
-  return rms_px(network, sighting, cam_from_body) / tolerance(sighting);
+  return distance_px(network, sighting, cam_from_body) / tolerance(sighting);
 }
 
 bool roughly_met(const Network& network, const Sighting& sighting, const Pose& cam_from_body) {

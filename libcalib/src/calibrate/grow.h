@@ -8,8 +8,8 @@
 
 namespace lumihull::calib::network {
 
-/// Whether a sighting is met by a pose, roughly: its RMS distance is below a share of its size as seen. Poses that
-/// later adjustments have not seen yet are off by more than noise. Its RMS distance over what counts as roughly met.
+/// Whether a sighting is met by a pose, roughly: its distance is below a share of its size as seen. Poses that
+/// later adjustments have not seen yet are off by more than noise. Its distance over what counts as roughly met.
 double rough_distance(const Network& network, const Sighting& sighting, const Pose& cam_from_body);
 bool roughly_met(const Network& network, const Sighting& sighting, const Pose& cam_from_body);
 

@@ -219,20 +219,21 @@ void find_poses(Network& network, Job& job) {
   });
 }
 
-double rms_px(const Network& network, const Sighting& sighting, const Pose& cam_from_body) {
+double distance_px(const Network& network, const Sighting& sighting, const Pose& cam_from_body) {
   const Camera& camera = network.camera_of(sighting.photo);
   const AdjustedBody& body = network.bodies[std::size_t(sighting.body)].body;
-  double sum = 0;
-  int count = 0;
+  std::vector<double> squares;
+  squares.reserve(sighting.seen.size());
   for (const std::uint32_t i : sighting.seen) {
     const Seen& s = network.seen[i];
-    if (!s.counts) continue;
     const auto pixel = camera.project(cam_from_body * body.points[std::size_t(s.point)].place);
     if (!pixel) return std::numeric_limits<double>::infinity();
-    sum += (*pixel - s.pixel).squaredNorm();
-    ++count;
+    squares.push_back((*pixel - s.pixel).squaredNorm());
   }
-  return count > 0 ? std::sqrt(sum / count) : std::numeric_limits<double>::infinity();
+  if (squares.empty()) return std::numeric_limits<double>::infinity();
+  const auto middle = squares.begin() + std::ptrdiff_t(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  return std::sqrt(*middle);
 }
 
 double focal_from_planes(const Network& network, int camera, int width, int height) {

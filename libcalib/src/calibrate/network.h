@@ -66,9 +66,9 @@ void find_poses(Network& network, Job& job);
 /// 0: no sighting says anything.
 double focal_from_planes(const Network& network, int camera, int width, int height);
 
-/// Largest distance of predicted from measured, px, in units of 1: RMS over a sighting's points that count; infinite
-/// where one lies behind the camera or beyond the lens.
-double rms_px(const Network& network, const Sighting& sighting, const Pose& cam_from_body);
+/// How far a pose puts a sighting's points from where they are seen, px: the median over all of them, whether they count
+/// or not; infinite where one lies behind the camera or beyond the lens.
+double distance_px(const Network& network, const Sighting& sighting, const Pose& cam_from_body);
 
 /// "photograph 0012", "target matrix5x5 17"
 std::string photo_text(const Network& network, int photo);

@@ -75,8 +75,8 @@ SimulatedCapture simulate_capture(const SimulatedOptions& o) {
   };
   for (int id = 0; id < o.targets; ++id) {
     const double turn = 2 * std::numbers::pi * (id + 0.5 * unit(random)) / o.targets;
-    if (o.floor_only || id % 3 == 0) {
-      const double r = o.floor_only ? 0.15 + 0.25 * (id % 3) + 0.1 * unit(random) : o.room_m * (0.3 + 0.5 * unit(random));
+    if (o.floor_only || id % 2 == 0) {
+      const double r = o.floor_only ? 0.15 + 0.25 * (id % 3) + 0.1 * unit(random) : o.room_m * (0.06 + 0.9 * unit(random));
       c.world_from_target.push_back(facing({r * std::cos(turn), r * std::sin(turn), 0}, Vector3d::UnitZ()));
     } else {
       const Vector3d out(std::cos(turn), std::sin(turn), 0);
