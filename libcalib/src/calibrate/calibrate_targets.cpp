@@ -82,6 +82,7 @@ std::optional<Settled> settle_robustly(Network& n, int part, int rounds, Job& jo
   for (int i = 0; i < rounds; ++i) {
     SettleOptions s;
     s.free = free;
+    s.as_points = true;
     const double scale = std::max(1.0, residual_scale(n, part));
     if (i > 0 && scale > 0.9 * before) break;
     before = scale;

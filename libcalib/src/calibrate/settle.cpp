@@ -50,6 +50,20 @@ std::vector<Pose> rig_of(const Network& n, int part, const std::vector<bool>& us
   return poses;
 }
 
+/// Where the centre of a circle's ellipse is seen, less where the circle's centre is.
+Eigen::Vector2d circle_offset(const Network& n, const Seen& seen) {
+  const PointMatch m = n.match(seen, true);
+  if (m.radius == 0) return Eigen::Vector2d::Zero();
+  BoardMatch match;
+  match.board = m.world, match.radius = m.radius, match.normal = m.normal;
+  Eigen::Vector2d ellipse, center;
+  const Pose& pose = *n.cam_from_world[std::size_t(seen.photo)];
+  if (!lens::predict(n.camera_of(seen.photo), pose, match, &ellipse)) return Eigen::Vector2d::Zero();
+  match.radius = 0;
+  if (!lens::predict(n.camera_of(seen.photo), pose, match, &center)) return Eigen::Vector2d::Zero();
+  return ellipse - center;
+}
+
 }  // namespace
 
 std::optional<Settled> settle(Network& n, int part, const std::vector<bool>& use, const SettleOptions& options,
@@ -132,7 +146,11 @@ std::optional<Settled> settle(Network& n, int part, const std::vector<bool>& use
                                     std::uint32_t(n.photos[std::size_t(s.photo)].camera),
                                     std::uint32_t(settled.body_of[std::size_t(s.body)]), std::uint32_t(s.point),
                                     s.pixel, s.covariance});
+    if (options.as_points) problem.observations.back().pixel -= circle_offset(n, s);
   }
+  if (options.as_points)
+    for (AdjustedBody& body : problem.bodies)
+      for (BodyPoint& p : body.points) p.radius = 0;
   for (ScaleBar bar : options.bars) {
     const int a = settled.body_of.at(bar.body_a), b = settled.body_of.at(bar.body_b);
     if (a < 0 || b < 0) continue;
@@ -157,7 +175,11 @@ std::optional<Settled> settle(Network& n, int part, const std::vector<bool>& use
       n.cam_from_world[i] = settled.cam_from_rig[std::size_t(n.photos[i].camera)] *
                             now.shots[std::size_t(settled.shot_of_photo[i])].rig_from_world;
   for (std::size_t b = 0; b < n.bodies.size(); ++b)
-    if (settled.body_of[b] >= 0) n.bodies[b].body = now.bodies[std::size_t(settled.body_of[b])];
+    if (settled.body_of[b] >= 0) {
+      std::vector<BodyPoint> printed = std::move(n.bodies[b].body.points);
+      n.bodies[b].body = now.bodies[std::size_t(settled.body_of[b])];
+      n.bodies[b].body.points = std::move(printed);  // radii, too
+    }
   return settled;
 }
 

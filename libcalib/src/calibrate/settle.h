@@ -12,6 +12,9 @@ struct SettleOptions {
   std::array<bool, kIntrinsics> free{};
   BodyModel model = BodyModel::rigid;
   double robust_sigma = 0;
+  /// Circles are taken for points, measured where their centres are seen from the poses as they are: near enough while
+  /// these still move, and many times faster.
+  bool as_points = false;
   int max_iterations = 20;
   bool covariances = false;
   bool rig = false;

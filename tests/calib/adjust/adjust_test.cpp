@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "scenes.h"
+#include "kinds.h"
 
 namespace lumihull {
 namespace {
@@ -18,31 +18,8 @@ AdjustResult adjusted(const calib::Adjustment& start, AdjustOptions options = {}
   return calib::adjust(start, options, job);
 }
 
-struct Kind {
-  const char* name;
-  test::SceneMaker maker;
-};
-
-std::vector<Kind> kinds() {
-  std::vector<Kind> all;
-  all.push_back({"rigid", {}});
-  all.push_back({"free", {.model = BodyModel::free}});
-  all.push_back({"bending", {.model = BodyModel::bending, .bend = 0.3}});
-  all.push_back({"rig", {.cameras = 2}});
-  all.push_back({"print", {.print_scale = {1.004, 0.998}, .bars = 2}});
-  all.push_back({"free with bars", {.model = BodyModel::free, .bars = 2}});
-  all.push_back({"free on a rig", {.model = BodyModel::free, .cameras = 2}});
-  all.push_back({"circles", {.radius = 0.009}});
-  all.push_back(
-      {"circles, bent, print",
-       {.radius = 0.009, .model = BodyModel::bending, .bend = 0.3, .print_scale = {1.004, 0.998}, .bars = 2}});
-  all.push_back({"more bodies than shots", {.shots = 5, .bodies = 14}});
-  all.push_back({"free, many shots", {.shots = 40, .bodies = 6, .model = BodyModel::free, .seen = 0.7}});
-  return all;
-}
-
 TEST(Adjust, ExactObservationsGiveTheTruth) {
-  for (Kind kind : kinds()) {
+  for (test::Kind kind : test::kinds()) {
     SCOPED_TRACE(kind.name);
     kind.maker.noise = 0;
     const test::Scene scene = test::make_scene(kind.maker, 1);
