@@ -320,14 +320,16 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
   std::optional<Settled> settled;
   for (int round = 0; round < 5; ++round) {
     last.covariances = false;
+    last.as_points = round == 0;
     settled = settle(n, 0, n.in_model, last, job);
     double scale = 1;
-    if (!settled || judge(n, 0, options.outlier_sigma, &scale) == 0) break;
+    if (!settled || (judge(n, 0, options.outlier_sigma, &scale) == 0 && round > 0)) break;
   }
   double flatness = 0;
   turn_world(n, 0, chosen_frame(n, 0, &flatness));
   c.bend_m = flatness;
   last.covariances = true;
+  last.as_points = false;
   settled = settle(n, 0, n.in_model, last, job);
   if (!settled) throw Error(ErrorCode::degenerate, "too few points are left to place any photograph", "targets");
 

@@ -32,6 +32,7 @@ void cross_validate(const Network& whole, SettleOptions options, Calibration& c,
   shots.erase(std::unique(shots.begin(), shots.end()), shots.end());
   if (int(shots.size()) < 2 * kLeastPhotos) return;
   options.covariances = true;
+  options.as_points = true;  // from poses that are right already
   std::array<Half, 2> halves;
   for (std::size_t h = 0; h < 2; ++h) {
     Network half = whole;

@@ -187,8 +187,9 @@ void judge_calibration(Calibration& c, std::span<const PhotoTargets> photos) {
   for (const CalibratedBody& b : c.bodies)
     if (b.placed && b.photos < 3 && ++count <= 5) rare += (count > 1 ? ", " : "") + b.name;
   if (count > 0)
-    c.warnings.push_back(formatted("%d of the targets are seen in fewer than three photographs, so nothing checks them: ",
-                                   count) + rare + (count > 5 ? ", …" : ""));
+    c.warnings.push_back(
+        formatted("%d of the targets are seen in fewer than three photographs, so nothing checks them: ", count) +
+        rare + (count > 5 ? ", …" : ""));
   std::string figures = formatted("%zu of %zu photographs placed, %.3f px RMS over %.1f %% of the observations", placed,
                                   photos.size(), c.rms_px, 100 * c.share);
   if (c.cross_validation_m >= 0) figures += formatted(", halves agree to %.3f mm", 1000 * c.cross_validation_m);

@@ -173,6 +173,22 @@ bool roughly_met(const Network& network, const Sighting& sighting, const Pose& c
   return rough_distance(network, sighting, cam_from_body) < 1;
 }
 
+bool occupied(const Network& n, int body, const Pose& world_from_body, std::size_t sightings, int part) {
+  double size = 0;
+  for (const BodyPoint& p : n.bodies[std::size_t(body)].body.points) size = std::max(size, p.place.norm());
+  for (std::size_t o = 0; o < n.bodies.size(); ++o) {
+    if (int(o) == body || n.body_part[o] != part || n.bodies[o].board >= 0) continue;
+    const Pose& other = n.bodies[o].body.world_from_body;
+    if ((other.translation - world_from_body.translation).norm() > 0.5 * size) continue;
+    std::size_t seen = 0;
+    for (const int s : n.by_body[o])
+      seen +=
+          n.sightings[std::size_t(s)].counts && n.photo_part[std::size_t(n.sightings[std::size_t(s)].photo)] == part;
+    if (seen > sightings) return true;
+  }
+  return false;
+}
+
 std::optional<BodyPlace> agreed_place(const Network& n, const std::vector<int>& sightings) {
   std::optional<BodyPlace> best;
   double least = std::numeric_limits<double>::infinity();
@@ -189,7 +205,7 @@ std::optional<BodyPlace> agreed_place(const Network& n, const std::vector<int>& 
         cost += std::min(1.0, off * off);
         if (off < 1) agree.push_back(i);
       }
-      if (cost < least) {
+      if (cost < least && !occupied(n, s.body, world_from_body, agree.size(), n.photo_part[std::size_t(s.photo)])) {
         least = cost;
         best = BodyPlace{world_from_body, std::move(agree)};
       }

@@ -28,11 +28,15 @@ bool place_photo(Network& network, int photo, int part);
 /// `use` is true: Gauss-Newton, robust.
 Pose refined_body(const Network& network, int body, Pose world_from_body, const std::function<bool(int)>& use);
 
-/// The pose that most of the given sightings of a body agree on, in the world of their photographs, and which they are.
+/// The pose that most of the given sightings of a body agree on, in the world of their photographs, and which they are;
+/// not where a body stands that is seen more often.
 struct BodyPlace {
   Pose world_from_body;
   std::vector<int> sightings;
 };
 std::optional<BodyPlace> agreed_place(const Network& network, const std::vector<int>& sightings);
+
+/// Whether another body, seen more often than `sightings` times, stands there: two targets can't, so one was misread.
+bool occupied(const Network& network, int body, const Pose& world_from_body, std::size_t sightings, int part);
 
 }  // namespace lumihull::calib::network

@@ -115,13 +115,23 @@ int second_look(Network& n, int part, Job& job) {
       now += clipped_cost(n, t, camera * n.bodies[b].body.world_from_body);
       then += clipped_cost(n, t, camera * place->world_from_body);
     }
-    if (then < kClearlyBetter * now - 0.05)
+    const std::size_t agree = place->sightings.size();
+    if (then < kClearlyBetter * now - 0.05 ||
+        (then < now + 0.05 && occupied(n, int(b), n.bodies[b].body.world_from_body, agree, part)))
       better[n.photos.size() + b] = place->world_from_body, changed[n.photos.size() + b] = 1;
   });
+  // What was judged from where they were counts again, until it is judged anew.
+  const auto give_back = [&](const std::vector<int>& sightings) {
+    for (const int s : sightings) {
+      n.sightings[std::size_t(s)].counts = true;
+      for (const std::uint32_t k : n.sightings[std::size_t(s)].seen) n.seen[k].counts = true;
+    }
+  };
   int count = 0;
   for (std::size_t i = 0; i < changed.size(); ++i) {
     if (!changed[i]) continue;
     ++count;
+    give_back(i < n.photos.size() ? n.by_photo[i] : n.by_body[i - n.photos.size()]);
     if (i < n.photos.size()) {
       n.cam_from_world[i] = better[i];
     } else {
@@ -145,17 +155,6 @@ bool find_second_places(Network& n, int part, Job& job) {
     if (off.size() < kSecondPlace) continue;
     const auto place = agreed_place(n, off);
     if (!place || place->sightings.size() < kSecondPlace) continue;
-    // Where another target stands it is that one, misread.
-    const Eigen::Vector3d center = place->world_from_body.translation;
-    double size = 0;
-    for (const BodyPoint& p : n.bodies[b].body.points) size = std::max(size, p.place.norm());
-    bool taken = false;
-    for (std::size_t o = 0; o < bodies; ++o)
-      if (o != b && n.body_part[o] == part &&
-          (n.bodies[o].body.world_from_body.translation - center).norm() < 0.5 * size)
-        taken = true;
-    if (taken) continue;
-
     const int fresh = int(n.bodies.size());
     CalibratedBody body = n.bodies[b];
     body.name += " (second place)";
@@ -198,7 +197,7 @@ bool find_second_places(Network& n, int part, Job& job) {
     const bool moved = best >= kInOrder * double(order.size()) && split >= 0;
     r.why = moved ? Removed::Why::moved : Removed::Why::same_id;
     r.photo = moved ? split : -1;
-    const double distance = (center - n.bodies[b].body.world_from_body.translation).norm();
+    const double distance = (place->world_from_body.translation - n.bodies[b].body.world_from_body.translation).norm();
     char text[64];
     std::snprintf(text, sizeof text, "%.1f mm", 1000 * distance);
     r.text = body_text(n, int(b)) +

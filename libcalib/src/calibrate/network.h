@@ -66,8 +66,8 @@ void find_poses(Network& network, Job& job);
 /// 0: no sighting says anything.
 double focal_from_planes(const Network& network, int camera, int width, int height);
 
-/// How far a pose puts a sighting's points from where they are seen, px: the median over all of them, whether they count
-/// or not; infinite where one lies behind the camera or beyond the lens.
+/// How far a pose puts a sighting's points from where they are seen, px: the median over all of them, whether they
+/// count or not; infinite where one lies behind the camera or beyond the lens.
 double distance_px(const Network& network, const Sighting& sighting, const Pose& cam_from_body);
 
 /// "photograph 0012", "target matrix5x5 17"

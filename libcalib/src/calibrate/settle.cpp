@@ -78,14 +78,17 @@ std::optional<Settled> settle(Network& n, int part, const std::vector<bool>& use
   std::vector<bool> photo_in(n.photos.size()), body_in(n.bodies.size());
   for (std::size_t i = 0; i < photo_in.size(); ++i) photo_in[i] = use[i] && n.photo_part[i] == part;
   for (std::size_t b = 0; b < body_in.size(); ++b) body_in[b] = n.body_part[b] == part;
-  std::vector<bool> taken(n.seen.size());
+  std::vector<bool> taken(n.seen.size()), in_sight(n.seen.size(), false);
+  for (std::size_t k = 0; k < n.seen.size(); ++k)
+    if (photo_in[std::size_t(n.seen[k].photo)] && body_in[std::size_t(n.seen[k].body)])
+      in_sight[k] = error_of(n, n.seen[k]).has_value();
   for (bool changed = true; changed;) {
     changed = false;
     std::vector<int> by_photo(n.photos.size(), 0), by_body(n.bodies.size(), 0);
     std::map<std::pair<int, int>, int> by_point;
     for (std::size_t k = 0; k < n.seen.size(); ++k) {
       const Seen& s = n.seen[k];
-      taken[k] = s.counts && photo_in[std::size_t(s.photo)] && body_in[std::size_t(s.body)];
+      taken[k] = s.counts && photo_in[std::size_t(s.photo)] && body_in[std::size_t(s.body)] && in_sight[k];
       if (taken[k] && options.model == BodyModel::free) ++by_point[{s.body, s.point}];
     }
     for (std::size_t k = 0; k < n.seen.size(); ++k) {

@@ -44,12 +44,25 @@ TEST(CalibrateTargets, PlacesEveryPhotographOfAnEnclosure) {
   for (const double radius : {0.8, 1.5, 2.7}) {
     SimulatedOptions o;
     o.radius_m = radius;
+    o.targets = 120;
     const SimulatedCapture capture = simulate_capture(o);
     for (const PhotoTargets& p : capture.photos) ASSERT_GE(p.targets.size(), 3u) << p.name << " at " << radius;
     const Calibration c = calibrate(capture);
     EXPECT_EQ(c.parts, 1);
     EXPECT_EQ(pose_errors(capture, c).photos, o.photos);
-    EXPECT_LT(pose_errors(capture, c).centre_m, 1e-4) << radius;
+    // As far off as the covariances say; their datum is the targets', the errors' the cameras', so roughly.
+    double expected = 0;
+    for (std::size_t i = 0; i < c.photos.size(); ++i) {
+      const CalibratedPhoto& p = c.photos[i];
+      // The centre is -R' t: it moves by -R' (dt - dr x t).
+      Eigen::Matrix<double, 3, 6> j;
+      const Eigen::Vector3d& t = p.cam_from_world->translation;
+      j << 0, -t.z(), t.y(), 1, 0, 0, t.z(), 0, -t.x(), 0, 1, 0, -t.y(), t.x(), 0, 0, 0, 1;
+      expected += (j * p.covariance * j.transpose()).trace() / double(c.photos.size());
+    }
+    EXPECT_LT(pose_errors(capture, c).centre_m, 1.5 * std::sqrt(expected)) << radius;
+    EXPECT_GT(pose_errors(capture, c).centre_m, 0.3 * std::sqrt(expected)) << radius;
+    EXPECT_LT(pose_errors(capture, c).centre_m, 3e-4) << radius;
     EXPECT_NEAR(c.rms_px, 0.05 * std::sqrt(2.0), 0.01);
     EXPECT_NEAR(c.sigma0, 1, 0.05);
     EXPECT_GT(c.share, 0.995);  // 4 sigma of a Rayleigh: 3.4 in 10,000
@@ -79,35 +92,40 @@ TEST(CalibrateTargets, SmallTagsThatCanBeTiltedEitherWay) {
   o.noise_px = 0.1;
   const SimulatedCapture capture = simulate_capture(o);
   const Calibration c = calibrate(capture, false);
-  EXPECT_EQ(pose_errors(capture, c).photos, o.photos);
-  EXPECT_LT(pose_errors(capture, c).centre_m, 0.02);
-  EXPECT_LT(c.rms_px, 0.15);
+  int enough = 0;
+  for (const PhotoTargets& p : capture.photos) enough += p.targets.size() >= 3;
+  ASSERT_GE(enough, 18);
+  EXPECT_GE(pose_errors(capture, c).photos, enough);
+  EXPECT_LT(pose_errors(capture, c).centre_m, 5e-4);
+  EXPECT_NEAR(c.rms_px, 0.1 * std::sqrt(2.0), 0.015);
   EXPECT_LT(c.bend_m, 2e-3);
   // z stands up from the sheet.
-  for (const CalibratedPhoto& p : c.photos) EXPECT_GT(p.cam_from_world->center().z(), 0);
+  for (const CalibratedPhoto& p : c.photos) EXPECT_TRUE(p.part != 0 || p.cam_from_world->center().z() > 0);
 }
 
 TEST(CalibrateTargets, WrongIdsAreNamedAndDoNotMatter) {
-  SimulatedCapture capture = simulate_capture({});
-  const double clean = pose_errors(capture, calibrate(capture)).centre_m;
+  SimulatedCapture capture = simulate_capture({}), without = capture;
   std::mt19937_64 random(7);
   std::vector<std::pair<int, int>> wrong;  // (photograph, id as read)
   for (std::size_t i = 0; i < capture.photos.size(); ++i)
     for (Detection& d : capture.photos[i].targets) {
-      if (random() % 20) continue;
-      const int other = int(random() % 120);
+      if (random() % 20 != 0) continue;
+      const int other = int(random() % 40);
       const bool there = std::any_of(capture.photos[i].targets.begin(), capture.photos[i].targets.end(),
                                      [&](const Detection& x) { return x.id == other; });
       if (there) continue;
+      std::erase_if(without.photos[i].targets, [&](const Detection& x) { return x.id == d.id; });
       d.id = other;
       wrong.emplace_back(int(i), other);
     }
+  const double clean = pose_errors(without, calibrate(without)).centre_m;
   ASSERT_GT(wrong.size(), 15u);
   const Calibration c = calibrate(capture);
   EXPECT_EQ(pose_errors(capture, c).photos, 60);
   EXPECT_LT(pose_errors(capture, c).centre_m, 1.02 * clean + 2e-6);
   std::vector<std::pair<int, int>> named;
-  for (const Removed* r : removed_as(c, Removed::Kind::detection, Removed::Why::wrong_id)) named.emplace_back(r->photo, r->id);
+  for (const Removed* r : removed_as(c, Removed::Kind::detection, Removed::Why::wrong_id))
+    named.emplace_back(r->photo, r->id);
   std::sort(named.begin(), named.end());
   std::sort(wrong.begin(), wrong.end());
   EXPECT_EQ(named, wrong);
@@ -126,22 +144,26 @@ TEST(CalibrateTargets, ATargetThatWasMovedHalfWayIsNamed) {
   EXPECT_EQ(named[0]->id, 4);
   EXPECT_GE(named[0]->photo, 28);
   EXPECT_LE(named[0]->photo, 33);
-  EXPECT_THAT(named[0]->text, HasSubstr("53.9 mm"));
+  EXPECT_THAT(named[0]->text, HasSubstr("moved by 53."));
 }
 
 TEST(CalibrateTargets, TwoTargetsWithOneIdAreNamed) {
   SimulatedCapture capture = simulate_capture({});
+  std::vector<int> seen(40, 0);
+  for (const PhotoTargets& p : capture.photos)
+    for (const Detection& d : p.targets) ++seen[std::size_t(d.id)];
+  const int id = int(std::max_element(seen.begin(), seen.end()) - seen.begin());
   // Photographs show the one or the other in turn: where both are seen a detector takes neither.
   for (std::size_t i = 0; i < 60; ++i)
     if (i % 3 == 0) {
-      Pose other = capture.world_from_target[5];
-      other.translation.z() += 0.3;
-      replace(capture, i, 5, other);
+      Pose other = capture.world_from_target[std::size_t(id)];
+      other.translation += 0.3 * (other.rotation * Eigen::Vector3d::UnitX());
+      replace(capture, i, id, other);
     }
   const Calibration c = calibrate(capture);
   const auto named = removed_as(c, Removed::Kind::target, Removed::Why::same_id);
   ASSERT_EQ(named.size(), 1u);
-  EXPECT_EQ(named[0]->id, 5);
+  EXPECT_EQ(named[0]->id, id);
   EXPECT_EQ(pose_errors(capture, c).photos, 60);
 }
 
@@ -200,17 +222,17 @@ TEST(CalibrateTargets, OrderAndThreadsDoNotMatter) {
 TEST(CalibrateTargets, TheRestIsPlacedByResection) {
   SimulatedCapture capture = simulate_capture({});
   CalibrateOptions options;
-  options.model_photos = 20;
+  options.model_photos = 40;
   const Calibration c = calibrate(capture, true, options);
   EXPECT_EQ(pose_errors(capture, c).photos, 60);
-  EXPECT_LT(pose_errors(capture, c).centre_m, 2e-4);
+  EXPECT_LT(pose_errors(capture, c).centre_m, 3e-4);
   int in_model = 0;
   for (const CalibratedPhoto& p : c.photos) {
     in_model += p.in_model;
     EXPECT_FALSE(p.reason.empty());
     EXPECT_GT(p.covariance.trace(), 0);
   }
-  EXPECT_EQ(in_model, 20);
+  EXPECT_EQ(in_model, 40);
 }
 
 TEST(CalibrateTargets, FaultsAreClear) {

@@ -28,7 +28,8 @@ std::optional<calib::Detection> see_target(const calib::TargetSet& set, int id, 
   const Pose cam_from_target = view.cam_from_world * world_from_target;
   const Eigen::Matrix3d r = cam_from_target.rotation.toRotationMatrix();
   const Vector3d middle = cam_from_target.translation;
-  if (!(middle.z() > 0.1) || r.col(2).dot(middle.normalized()) < 0.35) return std::nullopt;  // from behind, or beyond 70 degrees
+  if (!(middle.z() > 0.1) || r.col(2).dot(middle.normalized()) < 0.35)
+    return std::nullopt;  // from behind, or beyond 70 degrees
   calib::Detection d;
   d.id = id;
   std::mt19937_64 random(seed);
@@ -36,8 +37,7 @@ std::optional<calib::Detection> see_target(const calib::TargetSet& set, int id, 
   std::vector<Vector2d> plane, pixels;
   for (int i = 0; i < design.features(); ++i) {
     const Vector2d place = design.feature(i);
-    const double radius =
-        design.family.kind() == calib::TargetKind::circles ? design.circle_radius_m() : 0;
+    const double radius = design.family.kind() == calib::TargetKind::circles ? design.circle_radius_m() : 0;
     const calib::Circle3 circle{cam_from_target * Vector3d(place.x(), place.y(), 0), r.col(0), r.col(1), radius};
     const auto pixel = calib::projected_circle_center(view.camera, circle);
     if (!pixel || pixel->x() < 8 || pixel->y() < 8 || pixel->x() > view.camera.width - 8 ||
@@ -76,7 +76,8 @@ SimulatedCapture simulate_capture(const SimulatedOptions& o) {
   for (int id = 0; id < o.targets; ++id) {
     const double turn = 2 * std::numbers::pi * (id + 0.5 * unit(random)) / o.targets;
     if (o.floor_only || id % 2 == 0) {
-      const double r = o.floor_only ? 0.15 + 0.25 * (id % 3) + 0.1 * unit(random) : o.room_m * (0.06 + 0.9 * unit(random));
+      const double r =
+          o.floor_only ? 0.15 + 0.25 * (id % 3) + 0.1 * unit(random) : o.room_m * (0.06 + 0.9 * unit(random));
       c.world_from_target.push_back(facing({r * std::cos(turn), r * std::sin(turn), 0}, Vector3d::UnitZ()));
     } else {
       const Vector3d out(std::cos(turn), std::sin(turn), 0);
@@ -119,7 +120,8 @@ PoseErrors pose_errors(const SimulatedCapture& truth, const calib::Calibration& 
   // Rotation by the cameras' own: three centres on a line would leave it open.
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const std::size_t i : photos)
-    sum += (truth.cam_from_world[i].rotation.conjugate() * answer.photos[i].cam_from_world->rotation).toRotationMatrix();
+    sum +=
+        (truth.cam_from_world[i].rotation.conjugate() * answer.photos[i].cam_from_world->rotation).toRotationMatrix();
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Matrix3d turn = svd.matrixU() * svd.matrixV().transpose();
   Vector3d shift(0, 0, 0);

@@ -10,8 +10,8 @@
 namespace lumihull::test {
 
 struct SimulatedOptions {
-  int photos = 60, targets = 120;
-  double radius_m = 1.5, room_m = 3;  ///< of the cameras' hemisphere, of the cylinder of walls
+  int photos = 60, targets = 40;
+  double radius_m = 2.7, room_m = 3;  ///< of the cameras' hemisphere, of the cylinder of walls
   double noise_px = 0.05;             ///< standard deviation of each coordinate, which the covariances say, too
   const char* family = "matrix5x5:36mm";
   bool floor_only = false;  ///< all targets on the floor, as on a sheet
