@@ -1,6 +1,7 @@
 #include <lumihull/base/capture.h>
 #include <lumihull/base/export.h>
 #include <lumihull/base/import.h>
+#include <lumihull/calib/target_tracks.h>
 #include <lumihull/slf/pipeline.h>
 #include <lumihull/slf/results.h>
 #include <pybind11/stl.h>
@@ -43,7 +44,9 @@ void bind_shots(py::class_<Capture>& c) {
            guarded([](const Capture& self, py::ssize_t i) { return self.shots[index(self, i)].cam_from_world; }),
            "shot"_a, "cam_from_world, or None.")
       .def("set_pose", guarded([](Capture& self, py::ssize_t i, const std::optional<Pose>& pose) {
-             self.shots[index(self, i)].cam_from_world = pose;
+             Shot& shot = self.shots[index(self, i)];
+             shot.cam_from_world = pose;
+             shot.pose_quality.reset();
            }),
            "shot"_a, "cam_from_world"_a)
       .def("view", guarded([](const Capture& self, py::ssize_t i) { return self.view(index(self, i)); }), "shot"_a)
@@ -81,6 +84,7 @@ void bind_cameras(py::class_<Capture>& c) {
       .def("set_camera", guarded([](Capture& self, std::size_t i, const Camera& camera) {
              if (i >= self.cameras.size()) throw py::index_error("no such camera");
              self.cameras[i] = camera;
+             self.camera_covariances.erase(int(i));
            }),
            "index"_a, "camera"_a);
 }
@@ -207,10 +211,12 @@ void bind_exchange(py::module_& module) {
              "capture"_a, "files"_a, py::kw_only(), "reference"_a = false,
              "Adds photographs of the empty enclosure; returns how many.");
   module.def("export_colmap", guarded([](const Capture& capture, const Path& folder, double max_refit_error_px) {
-               return export_colmap(capture, folder, {.max_refit_error_px = max_refit_error_px}).largest_refit_error_px;
+               return export_colmap(capture, folder, {.max_refit_error_px = max_refit_error_px},
+                                    calib::target_tracks(capture))
+                   .largest_refit_error_px;
              }),
              "capture"_a, "folder"_a, py::kw_only(), "max_refit_error_px"_a = 0.5,
-             "A COLMAP text model; returns the largest error of a lens in px.");
+             "A COLMAP text model, with the targets as its points where there are; returns the largest error of a lens in px.");
   module.def("export_nerf", guarded([](const Capture& capture, const Path& file, double max_refit_error_px) {
                return export_nerf(capture, file, {.max_refit_error_px = max_refit_error_px}).largest_refit_error_px;
              }),
