@@ -49,6 +49,16 @@ void bind_shots(py::class_<Capture>& c) {
              shot.pose_quality.reset();
            }),
            "shot"_a, "cam_from_world"_a)
+      .def("pose_covariance", guarded([](const Capture& self, py::ssize_t i) -> std::optional<Array<double>> {
+             const Shot& shot = self.shots[index(self, i)];
+             if (!shot.pose_quality) return std::nullopt;
+             Array<double> out({py::ssize_t(6), py::ssize_t(6)});
+             Eigen::Map<Eigen::Matrix<double, 6, 6>>(out.mutable_data()) = shot.pose_quality->covariance;
+             return out;
+           }),
+           "shot"_a,
+           "(6, 6): of (rotation vector, translation) of a small motion applied after cam_from_world, rad and metres; "
+           "None where the stage \"calibrate\" did not find the pose.")
       .def("view", guarded([](const Capture& self, py::ssize_t i) { return self.view(index(self, i)); }), "shot"_a)
       .def("read_photo", guarded([](const Capture& self, py::ssize_t i) {
              const std::size_t shot = index(self, i);
@@ -76,6 +86,15 @@ void bind_shots(py::class_<Capture>& c) {
 
 void bind_cameras(py::class_<Capture>& c) {
   c.def_property_readonly("cameras", guarded([](const Capture& self) { return self.cameras; }), "Copies.")
+      .def("camera_covariance", guarded([](const Capture& self, std::size_t i) -> std::optional<Array<double>> {
+             if (i >= self.cameras.size()) throw py::index_error("no such camera");
+             const auto at = self.camera_covariances.find(int(i));
+             if (at == self.camera_covariances.end()) return std::nullopt;
+             Array<double> out({py::ssize_t(10), py::ssize_t(10)});
+             Eigen::Map<Eigen::Matrix<double, 10, 10>>(out.mutable_data()) = at->second;
+             return out;
+           }),
+           "index"_a, "(10, 10): f, s, skew, u0, v0, k1, k2, k3, p1, p2; None where it was not refined.")
       .def("add_camera", guarded([](Capture& self, const Camera& camera) {
              self.cameras.push_back(camera);
              return self.cameras.size() - 1;

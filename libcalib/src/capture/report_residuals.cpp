@@ -66,7 +66,7 @@ std::string coverage(const TargetModel& model, std::size_t camera) {
   SvgFigure figure("Where in the picture was measured" + camera_title(model, camera), 760,
                    600 * std::clamp(k.height / double(k.width), 0.3, 2.0) + 40);
   figure.note("points in each cell, brighter: more, at most " + std::to_string(most) + "; grey: none (" +
-              number("%.0f", 100.0 * double(empty) / cells.count()) + " % of the picture): the lens is a guess there");
+              number("%.0f", 100.0 * double(empty) / cells.count()) + " %): the lens is a guess there");
   figure.axes(0, k.width, k.height, 0, "u, px", "v, px");
   for (int i = 0; i < cells.count(); ++i) {
     const std::size_t count = n[std::size_t(i)];
@@ -98,9 +98,9 @@ std::string residual_map(const TargetModel& model, std::size_t camera) {
     return figure.str();
   }
   const double times = lens::magnification(model.calibration.rms_px, 0.03 * k.width);
-  figure.note("RMS of cells of at least 5 points, " + number("%.3g", low) + " (dark) to " + number("%.3g", high) +
-              " px (bright); white: their mean error, " + number("%g", times) +
-              " times as large: a pattern means that the lens model does not fit");
+  figure.note("RMS in cells of 5 points or more, " + number("%.3g", low) + " (dark) to " + number("%.3g", high) +
+              " px (bright); white: mean error, " + number("%g", times) +
+              " times as large; a pattern: the lens does not fit");
   figure.axes(0, k.width, k.height, 0, "u, px", "v, px");
   for (int i = 0; i < cells.count(); ++i) {
     const Mean& m = means[std::size_t(i)];

@@ -81,7 +81,10 @@ Frame frame_of(const std::vector<const CalibratedPhoto*>& photos, const std::vec
   const Vector3d across = up.unitOrthogonal();
   frame.scene_from_world << across.transpose(), up.cross(across).transpose(), up.transpose();
   frame.center = 0.5 * (low + high);
-  frame.reach = std::max(1e-9, 0.5 * (high - low).norm());
+  frame.reach = 1e-9;
+  const auto reach = [&](const Vector3d& p) { frame.reach = std::max(frame.reach, (p - frame.center).norm()); };
+  for (const CalibratedPhoto* p : photos) reach(p->cam_from_world->center());
+  for (const CalibratedBody* b : bodies) std::for_each(b->points.begin(), b->points.end(), reach);
   return frame;
 }
 
@@ -232,7 +235,7 @@ std::string scene(const TargetModel& model) {
     add_ellipsoid(middle_of(*bodies[i]), body_covariances[i], times, frame, shapes);
   constexpr std::size_t kMostNames = 60;
   if (bodies.size() <= kMostNames)
-    for (const CalibratedBody* b : bodies) shapes.push_back({"name", {frame(middle_of(*b))}, b->name});
+    for (const CalibratedBody* b : bodies) shapes.push_back({"name", {frame(middle_of(*b))}, b->id >= 0 ? std::to_string(b->id) : b->name});
 
   return "<p class=\"dim\">Blue: photographs that the model was made from; grey: placed afterwards; green: targets. "
          "Orange: one standard deviation, " +
