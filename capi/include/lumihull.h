@@ -511,7 +511,8 @@ LH_API lh_status lh_capture_import_masks(lh_context *ctx, lh_capture *capture, c
 LH_API lh_status lh_capture_import_enclosure(lh_context *ctx, lh_capture *capture, const char *const *files, size_t n,
                                              int32_t reference);
 
-/** A COLMAP text model into a new or empty folder. max_refit_error_px: of a lens in the other model, 0: 0.5;
+/** A COLMAP text model into a new or empty folder; where the capture has a target model, with the targets as its points.
+ *  max_refit_error_px: of a lens in the other model, 0: 0.5;
  *  largest_error_px: NULL, or what it came to.
  *  @return LH_EUNSUPPORTED: a camera that can't be expressed; LH_EINPUT: no photograph has a pose */
 LH_API lh_status lh_capture_export_colmap(lh_context *ctx, const lh_capture *capture, const char *folder,

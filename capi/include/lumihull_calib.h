@@ -365,6 +365,73 @@ LH_API lh_status lh_lens_uncertainty(lh_context *ctx, const lh_lens *lens, int32
 LH_API lh_status lh_lens_save(lh_context *ctx, const lh_lens *lens, const char *file);
 LH_API lh_status lh_lens_load(lh_context *ctx, const char *file, lh_lens **out);
 
+/* ---- a capture's calibration: what the stage "calibrate" left -------------------------------------------------------- */
+
+/** The targets as they were solved and how good the calibration is. Never changes. */
+typedef struct lh_target_model lh_target_model;
+
+/** targets.json of a capture, with its cameras and poses. @return LH_ENOTFOUND: the stage has not been run; LH_EINPUT */
+LH_API lh_status lh_target_model_open(lh_context *ctx, const lh_capture *capture, lh_target_model **out);
+LH_API void lh_target_model_destroy(lh_target_model *model);
+
+typedef struct lh_calibration {
+  size_t struct_size;
+  size_t photos, photos_placed;
+  size_t targets, targets_placed; /**< targets, or boards of targets */
+  size_t removed;                 /**< observations, detections, targets and photographs that were left out */
+  double rms_px;                  /**< sqrt(sum of dx² + dy² / observations that count) */
+  double share;                   /**< of the observations in placed photographs that count */
+  double sigma0;                  /**< residuals over their covariances: about 1 */
+  double cross_validation_m;      /**< two halves of the photographs: RMS distance of the points; < 0: too few */
+  double cross_validation_sigma;  /**< that over what the covariances expect, about 1; < 0: too few */
+  double bend_m;                  /**< largest departure from flat, or from as printed */
+  double print_scale[2];          /**< true length / length as printed, along x and y */
+  int32_t parts;                  /**< parts of the photographs that share no target; the largest one is placed */
+} lh_calibration;
+
+/** calibration: its struct_size says how much of it is filled. */
+LH_API lh_status lh_target_model_calibration(lh_context *ctx, const lh_target_model *model, lh_calibration *calibration);
+/** All figures, what was removed and why, intrinsics with standard deviations and the verdict, as one JSON object. */
+LH_API lh_status lh_target_model_describe(lh_context *ctx, const lh_target_model *model, char *buffer, size_t size,
+                                          size_t *needed);
+
+typedef struct lh_solved_target {
+  size_t struct_size;
+  int32_t board;              /**< which of the set's boards; -1: a target of its own */
+  int32_t design, id;         /**< of a target of its own; else -1 */
+  int32_t placed;             /**< yes: it has a pose and points in the world */
+  size_t points;              /**< printed points */
+  int32_t photos;             /**< that show it */
+  double rms_px;
+  double world_from_body[12]; /**< 3 x 4, metres, where placed */
+} lh_solved_target;
+
+/** Targets, or boards of targets; 0 for NULL. */
+LH_API size_t lh_target_model_count(const lh_target_model *model);
+LH_API lh_status lh_target_model_get(lh_context *ctx, const lh_target_model *model, size_t i, lh_solved_target *out);
+/** "matrix5x5 17", or a board's name. */
+LH_API lh_status lh_target_model_name(lh_context *ctx, const lh_target_model *model, size_t i, char *buffer, size_t size,
+                                      size_t *needed);
+/**
+ * The points of target or board i.
+ *
+ * @param names      n x 3, or NULL: design, id, feature
+ * @param xyz        n x 3, or NULL: in the world, metres; NaN where it is not placed
+ * @param covariance n x 9, or NULL: 3 x 3 each, m²; NaN where it is not placed
+ * @param n          at least as many as it has points
+ */
+LH_API lh_status lh_target_model_points(lh_context *ctx, const lh_target_model *model, size_t i, int32_t *names,
+                                        double *xyz, double *covariance, size_t n);
+
+/** How well a photograph's pose is known. covariance: 6 x 6, of (rotation vector, translation) of a small motion applied
+ *  after cam_from_world: rad, metres. covariance, points, rms_px: each may be NULL.
+ *  @return LH_ENOTFOUND: the pose was not calibrated, or there is none */
+LH_API lh_status lh_capture_pose_quality(lh_context *ctx, const lh_capture *capture, size_t shot, double covariance[36],
+                                         size_t *points, double *rms_px);
+/** covariance: 10 x 10, in the order of lh_lens_covariance. @return LH_ENOTFOUND: the camera was not refined */
+LH_API lh_status lh_capture_camera_covariance(lh_context *ctx, const lh_capture *capture, size_t camera,
+                                              double covariance[100]);
+
 #ifdef __cplusplus
 }
 #endif

@@ -61,8 +61,9 @@ lh_status lh_capture_get_camera(lh_context* ctx, const lh_capture* capture, size
 
 lh_status lh_capture_set_camera(lh_context* ctx, lh_capture* capture, size_t i, const lh_camera* camera) {
   return guarded(ctx, [&] {
-    auto& cameras = given(capture, "capture").value.cameras;
-    cameras[index(i, cameras.size(), "index")] = camera_from(camera, "camera");
+    Capture& c = given(capture, "capture").value;
+    c.cameras[index(i, c.cameras.size(), "index")] = camera_from(camera, "camera");
+    c.camera_covariances.erase(int(i));
   });
 }
 
@@ -124,8 +125,10 @@ lh_status lh_capture_get_pose(lh_context* ctx, const lh_capture* capture, size_t
 lh_status lh_capture_set_pose(lh_context* ctx, lh_capture* capture, size_t shot, const double cam_from_world[12]) {
   return guarded(ctx, [&] {
     Shot& s = shot_of(capture, shot);
-    if (!cam_from_world) return s.cam_from_world.reset();
-    s.cam_from_world = pose_from(cam_from_world, "cam_from_world");
+    std::optional<Pose> pose;
+    if (cam_from_world) pose = pose_from(cam_from_world, "cam_from_world");
+    s.cam_from_world = pose;
+    s.pose_quality.reset();
   });
 }
 

@@ -1,4 +1,5 @@
 #include <lumihull/base/export.h>
+#include <lumihull/calib/target_tracks.h>
 #include <lumihull/base/import.h>
 
 #include <vector>
@@ -105,9 +106,9 @@ lh_status lh_capture_import_enclosure(lh_context* ctx, lh_capture* capture, cons
 lh_status lh_capture_export_colmap(lh_context* ctx, const lh_capture* capture, const char* folder,
                                    double max_refit_error_px, double* largest_error_px) {
   return guarded(ctx, [&] {
-    give_error(
-        export_colmap(given(capture, "capture").value, path(folder, "folder"), export_options(max_refit_error_px)),
-        largest_error_px);
+    const Capture& c = given(capture, "capture").value;
+    give_error(export_colmap(c, path(folder, "folder"), export_options(max_refit_error_px), calib::target_tracks(c)),
+               largest_error_px);
   });
 }
 

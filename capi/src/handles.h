@@ -8,6 +8,7 @@
 #include <lumihull/calib/detect_targets.h>
 #include <lumihull/calib/ink_key.h>
 #include <lumihull/calib/lens_calibration.h>
+#include <lumihull/calib/target_model.h>
 #include <lumihull/calib/target_set.h>
 #include <lumihull/hull/mesh.h>
 #include <lumihull/hull/ray_scene.h>
@@ -50,6 +51,10 @@ struct lh_detections {
 struct lh_lens {
   lumihull::calib::LensCalibration value;
   std::vector<std::size_t> first;  ///< of each view's points, and their number at the end
+};
+
+struct lh_target_model {
+  lumihull::calib::TargetModel value;
 };
 
 struct lh_ink_samples {

@@ -3,11 +3,11 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/parallel.h>
 #include <lumihull/calib/detect_targets.h>
+#include <lumihull/calib/detections_json.h>
 #include <lumihull/calib/ink_key.h>
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -31,8 +31,7 @@ struct Arguments {
 };
 
 struct Seen {
-  int width = 0, height = 0;
-  Detections found;
+  calib::PhotoDetections of;
   std::string drawing;
 };
 
@@ -43,46 +42,6 @@ std::array<int, kReasons.size()> count_reasons(const Detections& found) {
   for (const auto& r : found.refused)
     if (std::size_t(r.reason) < counts.size()) ++counts[std::size_t(r.reason)];
   return counts;
-}
-
-std::string number(double v) {
-  if (!std::isfinite(v)) return "null";
-  char text[32];
-  std::snprintf(text, sizeof text, "%.10g", v);
-  return text;
-}
-
-std::string json_of(const calib::TargetSet& set, const Detection& d) {
-  std::string text;
-  if (d.id < 0)
-    text = "{\"grid\": " + std::to_string(d.design);
-  else
-    text = "{\"design\": " + std::to_string(d.design) +
-           ", \"family\": " + json_text(set.designs[std::size_t(d.design)].family.name()) +
-           ", \"id\": " + std::to_string(d.id);
-  text += ", \"corrected\": " + std::to_string(d.corrected) + ", \"erased\": " + std::to_string(d.erased) +
-          ", \"rms_px\": " + number(d.rms_px) + ", \"features\": [";
-  for (std::size_t i = 0; i < d.features.size(); ++i) {
-    const calib::Feature& f = d.features[i];
-    text += std::string(i ? ", " : "") + "{\"index\": " + std::to_string(f.index) + ", \"pixel\": [" +
-            number(f.pixel.x()) + ", " + number(f.pixel.y()) + "], \"covariance\": [" + number(f.covariance(0, 0)) +
-            ", " + number(f.covariance(0, 1)) + ", " + number(f.covariance(1, 1)) + "]}";
-  }
-  return text + "]}";
-}
-
-std::string json_of(const calib::TargetSet& set, const std::string& photo, const Seen& seen) {
-  std::string text = "{\"photo\": " + json_text(photo) + ", \"width\": " + std::to_string(seen.width) +
-                     ", \"height\": " + std::to_string(seen.height) + ", \"targets\": [";
-  for (std::size_t i = 0; i < seen.found.targets.size(); ++i)
-    text += (i ? ", " : "") + json_of(set, seen.found.targets[i]);
-  text += "], \"refused\": {";
-  const auto counts = count_reasons(seen.found);
-  for (std::size_t i = 0; i < counts.size(); ++i)
-    text += std::string(i ? ", \"" : "\"") + kReasons[i] + "\": " + std::to_string(counts[i]);
-  text += "}";
-  if (!seen.drawing.empty()) text += ", \"drawing\": " + json_text(seen.drawing);
-  return text + "}";
 }
 
 /// NAME.png for each photograph; a number behind where names come twice.
@@ -116,11 +75,10 @@ void detect(Program& program, const Arguments& a) {
   std::vector<Seen> seen(a.photos.size());
   const auto look = [&](std::size_t i, Job& inner) {
     const Image photo = read_image(a.photos[i]);
-    seen[i].width = photo.width(), seen[i].height = photo.height();
-    seen[i].found = detector.detect(photo, inner);
-    if (ink) ink->add(photo, detector.set(), seen[i].found);
+    seen[i].of = {a.photos[i], photo.width(), photo.height(), detector.detect(photo, inner)};
+    if (ink) ink->add(photo, detector.set(), seen[i].of.found);
     if (drawings.empty()) return;
-    write_png(drawings[i], draw_detections(photo, detector.set(), seen[i].found, a.magnify));
+    write_png(drawings[i], draw_detections(photo, detector.set(), seen[i].of.found, a.magnify));
     seen[i].drawing = drawings[i];
   };
   // Many photographs: a thread each. Few: all threads work on one of them.
@@ -149,7 +107,7 @@ void detect(Program& program, const Arguments& a) {
 
   std::size_t targets = 0, features = 0;
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    const Detections& found = seen[i].found;
+    const Detections& found = seen[i].of.found;
     targets += found.targets.size();
     for (const Detection& d : found.targets) features += d.features.size();
     std::string line = a.photos[i] + ": " + std::to_string(found.targets.size()) + " targets";
@@ -162,8 +120,11 @@ void detect(Program& program, const Arguments& a) {
               std::to_string(seen.size()) + " photographs");
   if (!program.json) return;
   std::cout << "{\"targets\": " << targets << ", \"features\": " << features << ", \"photos\": [";
-  for (std::size_t i = 0; i < seen.size(); ++i)
-    std::cout << (i ? ",\n" : "\n") << json_of(detector.set(), a.photos[i], seen[i]);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    std::string one = detections_json(detector.set(), seen[i].of);
+    if (!seen[i].drawing.empty()) one.replace(one.size() - 1, 1, ", \"drawing\": " + json_text(seen[i].drawing) + "}");
+    std::cout << (i ? ",\n" : "\n") << one;
+  }
   std::cout << "]}\n";
 }
 

@@ -3,6 +3,7 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/export.h>
 #include <lumihull/base/files.h>
+#include <lumihull/calib/target_tracks.h>
 #include <lumihull/hull/mesh.h>
 #include <lumihull/slf/results.h>
 
@@ -52,10 +53,12 @@ void add_export(Program& program) {
   };
   const auto options = [a] { return ExportOptions{.max_refit_error_px = a->max_refit_error}; };
 
-  for (CLI::App* sub : {format("colmap", "a COLMAP text model: a folder",
+  for (CLI::App* sub : {format("colmap", "a COLMAP text model: a folder; with targets as its points where there are",
                                [&program, a, options] {
+                                 const Capture capture = Capture::open(a->folder);
                                  say_exported(program, *a,
-                                              export_colmap(Capture::open(a->folder), a->output, options()));
+                                              export_colmap(capture, a->output, options(),
+                                                            calib::target_tracks(capture)));
                                }),
                         format("nerf", "NeRF's transforms.json", [&program, a, options] {
                           refuse_existing(a->output);

@@ -120,6 +120,7 @@ void Program::draw(const Progress& p) {
 
 int Program::run(int argc, char** argv) {
   add_import(*this);
+  add_calibrate(*this);
   add_key(*this);
   add_hull(*this);
   add_texture(*this);
@@ -183,7 +184,7 @@ StageFlags::StageFlags(CLI::App* verb, std::vector<std::string_view> stages) {
         flag->option->type_name(choices);
       } else {
         constexpr const char* kTypes[] = {"[true|false]", "INTEGER", "NUMBER", "TEXT", "NUMBER,…"};
-        flag->option->type_name(spec.path ? "PATH" : kTypes[spec.fallback.index()]);
+        flag->option->type_name(spec.word ? "WORD|FILE" : spec.path ? "PATH" : kTypes[spec.fallback.index()]);
       }
       flags_.push_back(std::move(flag));
     }

@@ -5,7 +5,7 @@
 namespace lumihull::program {
 
 void add_run(Program& program) {
-  add_stage_verb(program, "run", "all the stages that are needed: key, hull, texture, lightfield, evaluate, report");
+  add_stage_verb(program, "run", "all the stages that are needed: calibrate, key, hull, texture, lightfield, evaluate, report");
 }
 
 }  // namespace lumihull::program

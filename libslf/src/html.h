@@ -19,7 +19,4 @@ std::string figure(const Image& picture, const std::string& caption);
 std::string formatted(const char* format, double value);
 std::string megabytes(std::uint64_t bytes);
 
-/// The picture made smaller to fit into `side` x `side` by averaging (8-bit, on stored values); never larger.
-Image fitted(const Image& picture, int side);
-
 }  // namespace lumihull::slf

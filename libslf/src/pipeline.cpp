@@ -17,14 +17,15 @@ namespace lumihull::slf {
 namespace {
 
 using Definition = const StageDefinition& (*)();
-constexpr std::array<std::string_view, 6> kNames{"key", "hull", "texture", "lightfield", "evaluate", "report"};
-constexpr std::array<Definition, 6> kDefinitions{key_stage,        hull_stage,     texture_stage,
+constexpr std::array<std::string_view, 7> kNames{"calibrate",  "key",      "hull",  "texture",
+                                                 "lightfield", "evaluate", "report"};
+constexpr std::array<Definition, 7> kDefinitions{calibrate_stage,  key_stage,      hull_stage,  texture_stage,
                                                  lightfield_stage, evaluate_stage, report_stage};
 
 const StageDefinition& definition(std::string_view stage) {
   for (const Definition d : kDefinitions)
     if (d().name == stage) return d();
-  throw Error(ErrorCode::invalid_argument, "expected one of key, hull, texture, lightfield, evaluate, report",
+  throw Error(ErrorCode::invalid_argument, "expected one of calibrate, key, hull, texture, lightfield, evaluate, report",
               std::string(stage));
 }
 
@@ -53,7 +54,7 @@ std::string expectation(const OptionSpec& spec) {
     text = "one of";
     for (const std::string& choice : spec.choices) text += (&choice == spec.choices.data() ? " " : ", ") + choice;
   }
-  if (spec.path) text = spec.choices.empty() ? "a path" : text + ", or a path";
+  if (spec.path) text = spec.word ? "a word or a path" : spec.choices.empty() ? "a path" : text + ", or a path";
   constexpr double kMax = std::numeric_limits<double>::max();
   if (spec.low > -kMax && spec.high < kMax)
     text += " from " + number_text(spec.low) + " to " + number_text(spec.high);
@@ -64,6 +65,12 @@ std::string expectation(const OptionSpec& spec) {
 
 bool is_choice(const OptionSpec& spec, const std::string& value) {
   return std::find(spec.choices.begin(), spec.choices.end(), value) != spec.choices.end();
+}
+
+/// As TargetSet::from_text tells words from files.
+bool is_word(const std::string& text) {
+  std::error_code error;
+  return !text.ends_with(".json") && !std::filesystem::exists(text, error);
 }
 
 /// The value as the option's own type. Error{invalid_argument} where it does not fit.
@@ -120,7 +127,8 @@ void set_option(Capture& capture, std::string_view stage, std::string_view name,
   const OptionSpec& spec = specification(stage, name);
   value = checked(spec, std::move(value));
   // The next command may run in another folder.
-  if (auto* s = std::get_if<std::string>(&value); s && spec.path && !s->empty() && !is_choice(spec, *s))
+  if (auto* s = std::get_if<std::string>(&value);
+      s && spec.path && !s->empty() && !is_choice(spec, *s) && !(spec.word && is_word(*s)))
     *s = std::filesystem::absolute(*s).lexically_normal().string();
   capture.options[std::string(stage)][spec.name] = std::move(value);
 }

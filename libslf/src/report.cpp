@@ -167,6 +167,8 @@ void write_report(const Capture& capture, const ReportOptions& options, Job& job
       std::to_string(count_if([&](std::size_t i) { return capture.positioned(i); })) + " positioned, " +
       std::to_string(count_if([&](std::size_t i) { return capture.held_out(i); })) +
       " held out; unit: " + (capture.unit == Unit::metres ? "metres" : "unknown") + ".</p>\n";
+  if (file_exists(capture.folder() / "calibration.html"))
+    page += "<p><a href=\"calibration.html\">How good the cameras' poses are</a></p>\n";
   for (const std::string& note : capture.notes) page += "<p class=\"dim\">" + html_escaped(note) + "</p>\n";
   if (has_light_field)
     add_light_field(page, light_field, positioned_views(capture), around(options.turntable_frames), job);

@@ -42,6 +42,7 @@ struct StageDefinition {
   std::vector<std::string> (*run)(Capture& capture, Job& job);
 };
 
+const StageDefinition& calibrate_stage();
 const StageDefinition& key_stage();
 const StageDefinition& hull_stage();
 const StageDefinition& texture_stage();
@@ -56,6 +57,7 @@ T effective(const Capture& capture, std::string_view stage, std::string_view nam
 
 /// The parts that several stages depend on.
 void add_photos(const Capture& capture, InputDigest& digest);   ///< stamps of all photographs
+void add_intrinsics(const Capture& capture, InputDigest& digest);
 void add_cameras(const Capture& capture, InputDigest& digest);  ///< intrinsics, poses, what is held out
 void add_masks(const Capture& capture, InputDigest& digest);    ///< bytes of all masks
 /// All that a colouring of the hull's surface is made from: photographs, cameras, masks, the hull.

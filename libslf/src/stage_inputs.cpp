@@ -33,13 +33,26 @@ void add_photos(const Capture& capture, InputDigest& digest) {
   for (const Shot& shot : capture.enclosure) digest.add("enclosure " + shot.name, shot.stamp.sha256);
 }
 
-void add_cameras(const Capture& capture, InputDigest& digest) {
+namespace {
+
+std::string intrinsics_bytes(const Capture& capture) {
   std::string bytes;
   for (const Camera& c : capture.cameras) {
     append_bytes(bytes, c.width);
     append_bytes(bytes, c.height);
     for (const double x : {c.f, c.s, c.skew, c.u0, c.v0, c.k1, c.k2, c.k3, c.p1, c.p2}) append_bytes(bytes, x);
   }
+  return bytes;
+}
+
+}  // namespace
+
+void add_intrinsics(const Capture& capture, InputDigest& digest) {
+  digest.add("intrinsics", intrinsics_bytes(capture));
+}
+
+void add_cameras(const Capture& capture, InputDigest& digest) {
+  std::string bytes = intrinsics_bytes(capture);
   for (const Shot& shot : capture.shots) {
     append_bytes(bytes, shot.camera);
     bytes += shot.cam_from_world ? 'p' : '-';

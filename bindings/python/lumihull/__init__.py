@@ -2,7 +2,7 @@
 
 >>> import lumihull
 >>> capture = lumihull.Capture.open("my_object")
->>> capture.run()                                    # key, hull, texture, evaluate, report
+>>> capture.run()                                    # calibrate, key, hull, texture, evaluate, report
 >>> renderer = lumihull.Renderer(capture)
 >>> rgba = renderer.render(capture.view(0)).rgba     # (height, width, 4) uint8
 
@@ -37,6 +37,7 @@ from ._lumihull import StageResult as StageResult
 from ._lumihull import TargetDesign as TargetDesign
 from ._lumihull import TargetDetector as TargetDetector
 from ._lumihull import TargetFamily as TargetFamily
+from ._lumihull import TargetModel as TargetModel
 from ._lumihull import TargetSet as TargetSet
 from ._lumihull import View as View
 from ._lumihull import __version__ as __version__

@@ -31,6 +31,7 @@ void bind_detections(py::module_& module);
 void bind_targets(py::module_& module);
 void bind_resect(py::module_& module);
 void bind_lens(py::module_& module);
+void bind_target_model(py::module_& module);
 
 [[noreturn]] inline void invalid(const std::string& message, const char* argument) {
   throw Error(ErrorCode::invalid_argument, message, argument);

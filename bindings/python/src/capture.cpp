@@ -1,6 +1,7 @@
 #include <lumihull/base/capture.h>
 #include <lumihull/base/export.h>
 #include <lumihull/base/import.h>
+#include <lumihull/calib/target_tracks.h>
 #include <lumihull/slf/pipeline.h>
 #include <lumihull/slf/results.h>
 #include <pybind11/stl.h>
@@ -43,9 +44,21 @@ void bind_shots(py::class_<Capture>& c) {
            guarded([](const Capture& self, py::ssize_t i) { return self.shots[index(self, i)].cam_from_world; }),
            "shot"_a, "cam_from_world, or None.")
       .def("set_pose", guarded([](Capture& self, py::ssize_t i, const std::optional<Pose>& pose) {
-             self.shots[index(self, i)].cam_from_world = pose;
+             Shot& shot = self.shots[index(self, i)];
+             shot.cam_from_world = pose;
+             shot.pose_quality.reset();
            }),
            "shot"_a, "cam_from_world"_a)
+      .def("pose_covariance", guarded([](const Capture& self, py::ssize_t i) -> std::optional<Array<double>> {
+             const Shot& shot = self.shots[index(self, i)];
+             if (!shot.pose_quality) return std::nullopt;
+             Array<double> out({py::ssize_t(6), py::ssize_t(6)});
+             Eigen::Map<Eigen::Matrix<double, 6, 6>>(out.mutable_data()) = shot.pose_quality->covariance;
+             return out;
+           }),
+           "shot"_a,
+           "(6, 6): of (rotation vector, translation) of a small motion applied after cam_from_world, rad and metres; "
+           "None where the stage \"calibrate\" did not find the pose.")
       .def("view", guarded([](const Capture& self, py::ssize_t i) { return self.view(index(self, i)); }), "shot"_a)
       .def("read_photo", guarded([](const Capture& self, py::ssize_t i) {
              const std::size_t shot = index(self, i);
@@ -73,6 +86,15 @@ void bind_shots(py::class_<Capture>& c) {
 
 void bind_cameras(py::class_<Capture>& c) {
   c.def_property_readonly("cameras", guarded([](const Capture& self) { return self.cameras; }), "Copies.")
+      .def("camera_covariance", guarded([](const Capture& self, std::size_t i) -> std::optional<Array<double>> {
+             if (i >= self.cameras.size()) throw py::index_error("no such camera");
+             const auto at = self.camera_covariances.find(int(i));
+             if (at == self.camera_covariances.end()) return std::nullopt;
+             Array<double> out({py::ssize_t(10), py::ssize_t(10)});
+             Eigen::Map<Eigen::Matrix<double, 10, 10>>(out.mutable_data()) = at->second;
+             return out;
+           }),
+           "index"_a, "(10, 10): f, s, skew, u0, v0, k1, k2, k3, p1, p2; None where it was not refined.")
       .def("add_camera", guarded([](Capture& self, const Camera& camera) {
              self.cameras.push_back(camera);
              return self.cameras.size() - 1;
@@ -81,6 +103,7 @@ void bind_cameras(py::class_<Capture>& c) {
       .def("set_camera", guarded([](Capture& self, std::size_t i, const Camera& camera) {
              if (i >= self.cameras.size()) throw py::index_error("no such camera");
              self.cameras[i] = camera;
+             self.camera_covariances.erase(int(i));
            }),
            "index"_a, "camera"_a);
 }
@@ -207,10 +230,12 @@ void bind_exchange(py::module_& module) {
              "capture"_a, "files"_a, py::kw_only(), "reference"_a = false,
              "Adds photographs of the empty enclosure; returns how many.");
   module.def("export_colmap", guarded([](const Capture& capture, const Path& folder, double max_refit_error_px) {
-               return export_colmap(capture, folder, {.max_refit_error_px = max_refit_error_px}).largest_refit_error_px;
+               return export_colmap(capture, folder, {.max_refit_error_px = max_refit_error_px},
+                                    calib::target_tracks(capture))
+                   .largest_refit_error_px;
              }),
              "capture"_a, "folder"_a, py::kw_only(), "max_refit_error_px"_a = 0.5,
-             "A COLMAP text model; returns the largest error of a lens in px.");
+             "A COLMAP text model, with the targets as its points where there are; returns the largest error of a lens in px.");
   module.def("export_nerf", guarded([](const Capture& capture, const Path& file, double max_refit_error_px) {
                return export_nerf(capture, file, {.max_refit_error_px = max_refit_error_px}).largest_refit_error_px;
              }),

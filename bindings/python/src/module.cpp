@@ -173,4 +173,5 @@ PYBIND11_MODULE(_lumihull, module) {
   python::bind_detections(module);
   python::bind_resect(module);
   python::bind_lens(module);
+  python::bind_target_model(module);
 }

@@ -25,16 +25,10 @@ struct Seen {
   bool outlier = false;
 };
 
-/// A magnification of one digit, by which vectors of `size` px become about `length` px long.
-double magnification(double size, double length) {
-  if (!(size > 0)) return 1;
-  return std::max(1.0, lens::tick_step(length / size, 1));
-}
-
 std::string vectors(const LensCalibration& c, const std::vector<Seen>& seen) {
   const double w = c.camera.width, h = c.camera.height;
   SvgFigure figure("Residuals over the picture", 760, 760 * std::clamp(h / w, 0.3, 2.0) + 40);
-  const double times = magnification(c.rms_px, 0.02 * w);
+  const double times = lens::magnification(c.rms_px, 0.02 * w);
   const std::size_t step = seen.size() / kMostDrawn + 1;
   figure.note("measured less predicted, " + number("%g", times) + " times as large" +
               (step > 1 ? ", every " + std::to_string(step) + "th" : "") + "; orange: outliers; green: means of cells");
@@ -118,19 +112,6 @@ std::string by_view(const LensCalibration& c, std::span<const BoardView> views, 
   return figure.str();
 }
 
-/// From dark blue over green to yellow; even steps look even.
-std::string map_color(double t) {
-  constexpr double kStops[][3] = {{68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {253, 231, 37}};
-  t = std::clamp(t, 0.0, 1.0) * 4;
-  const int i = std::min(3, int(t));
-  char text[8];
-  int rgb[3];
-  for (int k = 0; k < 3; ++k) rgb[k] = int(kStops[i][k] + (t - i) * (kStops[i + 1][k] - kStops[i][k]) + 0.5);
-  std::snprintf(text, sizeof text, "#%02x%02x%02x", unsigned(rgb[0]) & 255u, unsigned(rgb[1]) & 255u,
-                unsigned(rgb[2]) & 255u);
-  return text;
-}
-
 std::string uncertainty_map(const LensCalibration& c) {
   const double w = c.camera.width, h = c.camera.height;
   constexpr int kColumns = 40, kRows = 30;
@@ -147,7 +128,7 @@ std::string uncertainty_map(const LensCalibration& c) {
     // Logarithmic: corners are often ten times worse than the middle.
     const double t =
         high > low && s > 0 ? std::log(s / std::max(low, 1e-300)) / std::log(high / std::max(low, 1e-300)) : 0;
-    figure.box(x, y, x + w / kColumns, y + h / kRows, std::isfinite(s) ? map_color(t) : "#808080");
+    figure.box(x, y, x + w / kColumns, y + h / kRows, std::isfinite(s) ? lens::map_color(t) : "#808080");
   }
   for (int y = 2; y < kRows; y += 5)
     for (int x = 2; x < kColumns; x += 7)

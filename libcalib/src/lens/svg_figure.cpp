@@ -39,6 +39,23 @@ double tick_step(double range, int count) {
   return 10 * power;
 }
 
+double magnification(double size, double length) {
+  if (!(size > 0)) return 1;
+  return std::max(1.0, tick_step(length / size, 1));
+}
+
+std::string map_color(double t) {
+  constexpr double kStops[][3] = {{68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {253, 231, 37}};
+  t = std::clamp(t, 0.0, 1.0) * 4;
+  const int i = std::min(3, int(t));
+  char text[8];
+  int rgb[3];
+  for (int k = 0; k < 3; ++k) rgb[k] = int(kStops[i][k] + (t - i) * (kStops[i + 1][k] - kStops[i][k]) + 0.5);
+  std::snprintf(text, sizeof text, "#%02x%02x%02x", unsigned(rgb[0]) & 255u, unsigned(rgb[1]) & 255u,
+                unsigned(rgb[2]) & 255u);
+  return text;
+}
+
 SvgFigure::SvgFigure(std::string title, double width, double height)
     : width_(width), height_(height), title_(std::move(title)) {}
 

@@ -14,6 +14,12 @@ std::string number(const char* format, double value);
 /// 1, 2 or 5 times a power of ten, for about `count` steps over a range.
 double tick_step(double range, int count);
 
+/// A magnification of one digit, by which vectors of `size` become about `length` long; at least 1.
+double magnification(double size, double length);
+
+/// From dark blue over green to yellow for 0 … 1; even steps look even. "#rrggbb".
+std::string map_color(double t);
+
 /// Data within [x0, x1] x [y0, y1] in a frame with ticks and labels. y downwards where y1 < y0.
 class SvgFigure {
  public:

@@ -5,6 +5,7 @@
 #include <initializer_list>
 
 #include "target_set_impl.h"
+#include "target_set_json.h"
 
 namespace lumihull::calib::internal {
 namespace {
@@ -139,9 +140,7 @@ Json print_list(const std::vector<Item>& items, Print print) {
 
 }  // namespace
 
-TargetSet parse_target_set(std::string_view text, const std::string& name) {
-  const Json document = lumihull::internal::parse_json(text, name);
-  const JsonReader top(document, name);
+TargetSet read_target_set(const JsonReader& top) {
   lumihull::internal::check_format(top, kFormat, kVersion);
   know_fields(top, {"format", "version", "designs", "boards", "grids"});
   TargetSet set;
@@ -149,17 +148,26 @@ TargetSet parse_target_set(std::string_view text, const std::string& name) {
   set.boards = read_list(top, "boards", read_board);
   set.grids = read_list(top, "grids", read_grid);
   check_set(set, [&](const std::string& pointer, const std::string& expected) {
-    throw Error(ErrorCode::bad_input, "at " + pointer + ": expected " + expected, name);
+    throw Error(ErrorCode::bad_input, "at " + top.pointer() + pointer + ": expected " + expected, top.file());
   });
   return set;
 }
 
-std::string print_target_set(const TargetSet& set, const std::string& name) {
+Json json_of(const TargetSet& set) {
   Json json{{"format", kFormat}, {"version", kVersion}};
   if (!set.designs.empty()) json["designs"] = print_list(set.designs, print_design);
   if (!set.boards.empty()) json["boards"] = print_list(set.boards, print_board);
   if (!set.grids.empty()) json["grids"] = print_list(set.grids, print_grid);
-  return lumihull::internal::print_json(json, name);
+  return json;
+}
+
+TargetSet parse_target_set(std::string_view text, const std::string& name) {
+  const Json document = lumihull::internal::parse_json(text, name);
+  return read_target_set(JsonReader(document, name));
+}
+
+std::string print_target_set(const TargetSet& set, const std::string& name) {
+  return lumihull::internal::print_json(json_of(set), name);
 }
 
 }  // namespace lumihull::calib::internal

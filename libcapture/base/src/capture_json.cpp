@@ -1,6 +1,7 @@
 #include "capture_json.h"
 
 #include <lumihull/internal/camera_json.h>
+#include <lumihull/internal/covariance_json.h>
 #include <lumihull/internal/pose_json.h>
 
 #include <set>
@@ -167,10 +168,40 @@ std::string print_capture_json(const Capture& capture, const std::string& name) 
   return print_json(json, name);
 }
 
+namespace {
+
+/// Version 2: how well cameras and poses are known.
+void read_quality(const JsonReader& top, const std::map<std::string, Shot*, std::less<>>& by_name, Capture& capture) {
+  if (top.has("camera_covariances")) {
+    const JsonReader list = top.at("camera_covariances");
+    const std::size_t n = list.array_size(kMaxCameras);
+    for (std::size_t i = 0; i < n; ++i) {
+      const JsonReader one = list.at(i);
+      const auto camera = int(one.at("camera").integer(0, std::int64_t(capture.cameras.size()) - 1));
+      if (!capture.camera_covariances.emplace(camera, read_covariance<10>(one.at("covariance"))).second)
+        one.at("camera").fail("each camera once");
+    }
+  }
+  if (!top.has("pose_quality")) return;
+  const JsonReader qualities = top.at("pose_quality");
+  if (!qualities.value().is_object()) qualities.fail("an object with an entry for each calibrated shot");
+  for (const auto& item : qualities.value().items()) {
+    const JsonReader json = qualities.at(item.key());
+    const auto shot = by_name.find(item.key());
+    if (shot == by_name.end() || !shot->second->cam_from_world) json.fail("the name of a shot that has a pose");
+    PoseQuality& quality = shot->second->pose_quality.emplace();
+    quality.covariance = read_covariance<6>(json.at("covariance"));
+    quality.points = int(json.at("points").integer(0, INT32_MAX));
+    quality.rms_px = json.at("rms_px").number(0);
+  }
+}
+
+}  // namespace
+
 void parse_cameras_json(std::string_view text, const std::string& name, Capture& capture) {
   const Json document = parse_json(text, name);
   const JsonReader top(document, name);
-  check_format(top, "lumihull-cameras", 1);
+  const std::int64_t version = check_format(top, "lumihull-cameras", 1, 2);
 
   const JsonReader cameras = top.at("cameras");
   const std::size_t n = cameras.array_size(kMaxCameras);
@@ -190,17 +221,30 @@ void parse_cameras_json(std::string_view text, const std::string& name, Capture&
     if (shot == by_name.end()) json.fail("the name of a shot of capture.json");
     shot->second->cam_from_world = read_pose(json);
   }
+  if (version >= 2) read_quality(top, by_name, capture);
 }
 
 std::string print_cameras_json(const Capture& capture, const std::string& name) {
   Json cameras = Json::array();
   for (const Camera& c : capture.cameras) cameras.push_back(print_camera(c));
-  Json poses = Json::object();
+  Json poses = Json::object(), qualities = Json::object(), covariances = Json::array();
   for (const Shot& shot : capture.shots) {
     if (!shot.cam_from_world) continue;
     poses[shot.name] = print_pose(*shot.cam_from_world);
+    if (const auto& q = shot.pose_quality)
+      qualities[shot.name] = {
+          {"covariance", print_covariance<6>(q->covariance)}, {"points", q->points}, {"rms_px", q->rms_px}};
   }
-  const Json json{{"format", "lumihull-cameras"}, {"version", 1}, {"cameras", cameras}, {"cam_from_world", poses}};
+  for (const auto& [camera, covariance] : capture.camera_covariances)
+    covariances.push_back({{"camera", camera}, {"covariance", print_covariance<10>(covariance)}});
+  // What holds nothing new stays readable for programs of before.
+  const bool plain = qualities.empty() && covariances.empty();
+  Json json{{"format", "lumihull-cameras"},
+            {"version", plain ? 1 : 2},
+            {"cameras", std::move(cameras)},
+            {"cam_from_world", std::move(poses)}};
+  if (!covariances.empty()) json["camera_covariances"] = std::move(covariances);
+  if (!qualities.empty()) json["pose_quality"] = std::move(qualities);
   return print_json(json, name);
 }
 

@@ -139,7 +139,7 @@ void parse_colmap_images_text(std::string_view text, const std::string& file, Co
       id_at(words, 0);
       const std::string name(words[9].data(), words.back().data() + words.back().size());
       if (name.find('\0') != std::string::npos) throw std::string("a NUL in the image's name");
-      model.images.push_back({name, id_at(words, 8), pose_of(v)});
+      model.images.push_back({name, id_at(words, 8), pose_of(v), {}});
     } catch (const std::string& what) {
       fail_at_line(file, i + 1, what);
     }
@@ -294,7 +294,27 @@ std::string print_colmap_images(const ColmapModel& model) {
     for (const double value : {p.rotation.w(), p.rotation.x(), p.rotation.y(), p.rotation.z(), p.translation.x(),
                                p.translation.y(), p.translation.z()})
       text += digits(value);
-    text += " " + std::to_string(image.camera) + " " + image.name + "\n\n";
+    text += " " + std::to_string(image.camera) + " " + image.name + "\n";
+    for (const ColmapImage::Point& point : image.points)
+      text += (&point == image.points.data() ? digits(point.pixel.x()).substr(1) : digits(point.pixel.x())) +
+              digits(point.pixel.y()) + " " + std::to_string(point.point3d + 1);
+    text += "\n";
+  }
+  return text;
+}
+
+std::string print_colmap_points(const ColmapModel& model) {
+  std::string text =
+      "# 3D point list with one line of data per point:\n"
+      "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n";
+  for (std::size_t i = 0; i < model.points.size(); ++i) {
+    const ColmapPoint& point = model.points[i];
+    text += std::to_string(i + 1);
+    for (const double value : {point.place.x(), point.place.y(), point.place.z()}) text += digits(value);
+    text += " 128 128 128" + digits(point.error_px);
+    for (const auto& [image, index] : point.track)
+      text += " " + std::to_string(image + 1) + " " + std::to_string(index);
+    text += "\n";
   }
   return text;
 }

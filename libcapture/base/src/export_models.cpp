@@ -48,9 +48,31 @@ std::vector<std::size_t> positioned_shots(const Capture& capture, ExportReport& 
   return shots;
 }
 
+void add_tracks(std::span<const Track> tracks, const std::map<std::size_t, std::size_t>& image_of,
+                internal::ColmapModel& model) {
+  for (const Track& track : tracks) {
+    internal::ColmapPoint point;
+    point.place = track.point;
+    for (const Track::Sight& sight : track.sights) {
+      const auto at = image_of.find(sight.shot);
+      if (at == image_of.end()) continue;
+      internal::ColmapImage& image = model.images[at->second];
+      const internal::ForwardCamera& camera = model.cameras.at(image.camera);
+      const Eigen::Vector3d p = image.cam_from_world * track.point;
+      point.error_px += (camera.project(p.hnormalized()) - sight.pixel).norm();
+      point.track.emplace_back(at->second, image.points.size());
+      image.points.push_back({sight.pixel, model.points.size()});
+    }
+    if (point.track.empty()) continue;
+    point.error_px /= double(point.track.size());
+    model.points.push_back(std::move(point));
+  }
+}
+
 }  // namespace
 
-ExportReport export_colmap(const Capture& capture, const fs::path& folder, const ExportOptions& options) {
+ExportReport export_colmap(const Capture& capture, const fs::path& folder, const ExportOptions& options,
+                           std::span<const Track> tracks) {
   using namespace internal;
   std::error_code error;
   if (fs::exists(folder, error) && (!fs::is_directory(folder, error) || !fs::is_empty(folder, error)))
@@ -58,23 +80,27 @@ ExportReport export_colmap(const Capture& capture, const fs::path& folder, const
   ExportReport report;
   ColmapModel model;
   std::set<std::string> names;
+  std::map<std::size_t, std::size_t> image_of;
   for (const std::size_t i : positioned_shots(capture, report)) {
     const Shot& shot = capture.shots[i];
     const std::string name = fs::path(shot.file).filename().string();
     if (!names.insert(name).second)
       throw Error(ErrorCode::unsupported, "two photographs are called " + name + ": COLMAP's names must differ",
                   shot.name);
-    model.images.push_back({name, shot.camera + 1, *shot.cam_from_world});
+    image_of[i] = model.images.size();
+    model.images.push_back({name, shot.camera + 1, *shot.cam_from_world, {}});
     if (!model.cameras.contains(shot.camera + 1))
       model.cameras[shot.camera + 1] = expressed(capture, shot.camera, {2, 6}, options, report);
   }
   if (std::any_of(names.begin(), names.end(), [](const auto& n) { return n.find(' ') != std::string::npos; }))
     report.notes.push_back("some photographs' names hold blanks, at which COLMAP cuts them off");
 
+  add_tracks(tracks, image_of, model);
+
   make_folder(folder);
   // images.txt comes last: COLMAP reads no folder without it.
   write_file(folder / "cameras.txt", print_colmap_cameras(model));
-  write_file(folder / "points3D.txt", "# 3D point list: none\n");
+  write_file(folder / "points3D.txt", print_colmap_points(model));
   write_file(folder / "images.txt", print_colmap_images(model));
   return report;
 }

@@ -194,4 +194,27 @@ float srgb_from_linear(float value) {
   return value <= 0.0031308f ? value * 12.92f : 1.055f * std::pow(value, 1 / 2.4f) - 0.055f;
 }
 
+Image fitted(const Image& picture, int side) {
+  const int factor_w = (picture.width() + side - 1) / side, factor_h = (picture.height() + side - 1) / side;
+  if (std::max(factor_w, factor_h) <= 1) return picture;
+  const double scale = double(side) / std::max(picture.width(), picture.height());
+  const int w = std::max(1, int(picture.width() * scale)), h = std::max(1, int(picture.height() * scale));
+  const int channels = picture.channels();
+  Image out(w, h, channels);
+  for (int y = 0; y < h; ++y) {
+    const int y0 = int(std::int64_t(y) * picture.height() / h), y1 = int(std::int64_t(y + 1) * picture.height() / h);
+    for (int x = 0; x < w; ++x) {
+      const int x0 = int(std::int64_t(x) * picture.width() / w), x1 = int(std::int64_t(x + 1) * picture.width() / w);
+      for (int c = 0; c < channels; ++c) {
+        std::int64_t sum = 0;
+        for (int j = y0; j < y1; ++j)
+          for (int i = x0; i < x1; ++i) sum += picture.row<std::uint8_t>(j)[i * channels + c];
+        const std::int64_t n = std::int64_t(y1 - y0) * (x1 - x0);
+        out.row<std::uint8_t>(y)[x * channels + c] = std::uint8_t((sum + n / 2) / n);
+      }
+    }
+  }
+  return out;
+}
+
 }  // namespace lumihull

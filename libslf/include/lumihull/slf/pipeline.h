@@ -17,6 +17,8 @@ namespace lumihull::slf {
 /// The stages in the order in which `run` does them. The verbs, the C API and Python share this list: they only parse
 /// and print.
 ///
+///     calibrate   photographs of targets -> cameras.json, targets.json, calibration.html   (left out where no targets
+///                 are named, and where poses were imported: then it is done only when asked for by its name)
 ///     key         photographs -> masks/                (left out where every mask was imported or drawn)
 ///     hull        masks, cameras -> hull.ply
 ///     texture     hull.ply, photographs -> textured.glb
@@ -33,6 +35,7 @@ struct OptionSpec {
   double low = -std::numeric_limits<double>::max(), high = std::numeric_limits<double>::max();  ///< numbers' range
   std::vector<std::string> choices = {};  ///< of a string; empty: any
   bool path = false;  ///< of a string that is none of `choices`: a file or folder; set_option makes it absolute
+  bool word = false;  ///< of a path: a text that is no file and does not end with ".json" is a word, kept as it is
 };
 
 /// Errors: invalid_argument (no such stage).

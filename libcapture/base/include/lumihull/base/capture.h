@@ -5,6 +5,7 @@
 #include <lumihull/base/image.h>
 #include <lumihull/base/job.h>
 
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -29,6 +30,14 @@ struct FileStamp {
   std::int64_t mtime_ns = 0;
 };
 
+/// How well a pose is known, where calibration found it.
+struct PoseQuality {
+  /// Of (rotation vector, translation) of a small motion applied after cam_from_world: rad, the capture's unit.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  int points = 0;     ///< measured points that it rests on
+  double rms_px = 0;  ///< sqrt(Σ (dx² + dy²) / points)
+};
+
 /// One shot of one camera.
 struct Shot {
   std::string name;  ///< unique in the capture; masks and renderings are named after it
@@ -37,6 +46,7 @@ struct Shot {
   int camera = 0;                      ///< index into Capture::cameras
   int orientation = 1;                 ///< EXIF; only for showing pictures to people
   std::optional<Pose> cam_from_world;  ///< nullopt: not positioned
+  std::optional<PoseQuality> pose_quality;  ///< of cam_from_world; whoever changes the pose resets it
   std::string time;                    ///< ISO 8601, from EXIF, or empty
   MaskSource mask_source = MaskSource::none;
   std::string mask_sha256;  ///< of the mask file as Lumihull wrote or imported it
@@ -55,7 +65,7 @@ using Options = std::map<std::string, OptionValue, std::less<>>;
 
 /// A capture: the folder that holds one object's photographs and everything made from them.
 ///
-///     capture.json   shots, options, stages      cameras.json   intrinsics and poses
+///     capture.json   shots, options, stages      cameras.json   intrinsics and poses, and how well they are known
 ///     photos/  enclosure/  masks/  hull.ply  light_field.glb  report.html
 ///
 /// The object in memory is a plain value; `save` writes both JSON files atomically. Reading checks every field: an
@@ -75,6 +85,9 @@ class LUMIHULL_API Capture {
 
   Unit unit = Unit::unknown;
   std::vector<Camera> cameras;
+  /// Of the cameras that calibration refined, by index into `cameras`: covariance of f, s, skew, u0, v0, k1, k2, k3, p1, p2 (px² where
+  /// both are in pixels); rows of zeros belong to parameters that were kept. Whoever changes a camera erases its entry.
+  std::map<int, Eigen::Matrix<double, 10, 10>> camera_covariances;
   std::vector<Shot> shots;
   std::vector<Shot> enclosure;  ///< photographs of the empty enclosure (name, file and stamp are used)
   std::map<std::string, Options, std::less<>> options;  ///< by stage: "key", "hull", "evaluate", …

@@ -3,7 +3,10 @@
 #include <lumihull/base/api.h>
 #include <lumihull/base/capture.h>
 
+#include <Eigen/Core>
+#include <cstddef>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -21,13 +24,24 @@ struct ExportReport {
   std::vector<std::string> notes;
 };
 
-/// Writes a COLMAP text model (cameras.txt, images.txt, an empty points3D.txt) into a new or empty folder. Image names
-/// are the photographs' file names. Cameras: PINHOLE where there is no lens distortion, else OPENCV or, where that is
+/// A point in space and where photographs show it.
+struct Track {
+  Eigen::Vector3d point{0, 0, 0};  ///< in the capture's world
+  struct Sight {
+    std::size_t shot = 0;
+    Eigen::Vector2d pixel{0, 0};
+  };
+  std::vector<Sight> sights;  ///< at most one a shot
+};
+
+/// Writes a COLMAP text model (cameras.txt, images.txt, points3D.txt) into a new or empty folder. Image names are the
+/// photographs' file names. points3D.txt and the images' points are the tracks; sights in shots without a pose are left
+/// out. Cameras: PINHOLE where there is no lens distortion, else OPENCV or, where that is
 /// off by more than 0.01 px, FULL_OPENCV. Errors: invalid_argument (folder in use), unsupported (a camera that COLMAP
 /// can't express to max_refit_error_px, e.g. with a skew; the message gives the error), bad_input (no positioned
 /// photograph).
 LUMIHULL_API ExportReport export_colmap(const Capture& capture, const std::filesystem::path& folder,
-                                        const ExportOptions& options = {});
+                                        const ExportOptions& options = {}, std::span<const Track> tracks = {});
 
 /// Writes NeRF's transforms.json with intrinsics for each frame: fl_x, fl_y, cx, cy, w, h, and k1, k2, p1, p2, k3
 /// (OpenCV's lens) where there is distortion. file_path is relative to the JSON file's folder. The same errors.

@@ -120,6 +120,10 @@ LUMIHULL_API std::string encode_jpeg(const Image& image, int quality = 92);
 /// The picture turned as EXIF orientation 1 … 8 asks.
 LUMIHULL_API Image oriented(const Image& image, int orientation);
 
+/// A small copy of an 8-bit picture, for people to look at: made to fit into `side` x `side` by averaging stored values;
+/// never larger.
+LUMIHULL_API Image fitted(const Image& image, int side);
+
 /// Converts type and channels: values scale by full range (255, 65535, 1.0), rounded to nearest.
 LUMIHULL_API Image converted(const Image& image, PixelType type, int channels);
 

@@ -68,9 +68,16 @@ LUMIHULL_API Capture import_nerf(std::span<const std::filesystem::path> files, c
 LUMIHULL_API Capture import_colmap(const std::filesystem::path& model, const std::filesystem::path& photos,
                                    const RefitImportOptions& options, Job& job);
 
+/// The camera that a photograph's header tells of: principal point in the middle, no lens distortion, f from EXIF's 35 mm
+/// equivalent (by the diagonal, 43.27 mm; CIPA DCG-001), else 1.2 times the longer side.
+struct HeaderCamera {
+  Camera camera;
+  bool f_known = false;  ///< f is EXIF's
+};
+LUMIHULL_API HeaderCamera camera_of_header(const ImageInfo& info);
+
 /// Imports photographs without poses. A camera is made for each combination of size, maker, model and focal length; its
-/// f comes from EXIF's 35 mm equivalent (by the diagonal, 43.27 mm), else it is 1.2 times the longer side and a note
-/// says that it is a guess. Principal point: the picture's centre.
+/// camera_of_header; a note says where f comes from.
 LUMIHULL_API Capture import_photos(std::span<const std::filesystem::path> files, const ImportOptions& options,
                                    Job& job);
 

@@ -27,6 +27,7 @@ class JsonReader {
 
   const Json& value() const { return *value_; }
   const std::string& file() const { return file_; }
+  const std::string& pointer() const { return pointer_; }
 
   [[noreturn]] void fail(const std::string& expected) const {
     throw Error(ErrorCode::bad_input,
@@ -120,10 +121,14 @@ inline Json read_json(const std::filesystem::path& file, std::size_t max_bytes =
   return parse_json(read_file(file, max_bytes), file.string());
 }
 
-/// Checks "format" and "version" at the top of one of Lumihull's own files.
-inline void check_format(const JsonReader& top, std::string_view format, std::int64_t version) {
+/// Checks "format" and "version" at the top of one of Lumihull's own files; returns the version.
+inline std::int64_t check_format(const JsonReader& top, std::string_view format, std::int64_t oldest,
+                                 std::int64_t newest) {
   if (top.at("format").string() != format) top.at("format").fail("\"" + std::string(format) + "\"");
-  top.at("version").integer(version, version);
+  return top.at("version").integer(oldest, newest);
+}
+inline void check_format(const JsonReader& top, std::string_view format, std::int64_t version) {
+  check_format(top, format, version, version);
 }
 
 }  // namespace lumihull::internal
