@@ -9,10 +9,8 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <iostream>
 #include <optional>
-#include <set>
 
 #include "program.h"
 
@@ -20,7 +18,6 @@ namespace lumihull::program {
 
 namespace {
 
-namespace fs = std::filesystem;
 using calib::Detection;
 using calib::Detections;
 
@@ -85,31 +82,13 @@ std::string json_of(const calib::TargetSet& set, const std::string& photo, const
   return text + "}";
 }
 
-/// NAME.png for each photograph; a number behind where names come twice.
-std::vector<std::string> drawing_names(const Arguments& a) {
-  std::vector<std::string> names;
-  std::set<std::string> taken;
-  for (const std::string& photo : a.photos) {
-    const std::string stem = fs::path(photo).stem().string();
-    std::string name = stem + ".png";
-    for (int i = 2; !taken.insert(name).second; ++i) name = stem + "-" + std::to_string(i) + ".png";
-    names.push_back((fs::path(a.draw) / name).string());
-    if (fs::exists(names.back()) && fs::equivalent(names.back(), photo))
-      throw Error(ErrorCode::invalid_argument, "the drawing would replace the photograph; name another folder", photo);
-  }
-  return names;
-}
-
 void detect(Program& program, const Arguments& a) {
   Job& job = program.job();
   calib::DetectOptions options;
   if (!a.ink_key.empty()) options.ink_key = calib::ColorKey::load(a.ink_key, job);
   const calib::TargetDetector detector(calib::TargetSet::from_text(a.targets), options);
   std::vector<std::string> drawings;
-  if (!a.draw.empty()) {
-    fs::create_directories(a.draw);
-    drawings = drawing_names(a);
-  }
+  if (!a.draw.empty()) drawings = drawing_names(a.draw, a.photos);
 
   std::optional<calib::InkSamples> ink;
   if (!a.learn_ink_key.empty()) ink.emplace();

@@ -70,7 +70,6 @@ class Drawing {
   }
 
   void legend(std::size_t targets) {
-    const double height = 10 * unit_, line = 1.7 * height;
     std::vector<std::pair<std::string, Rgb>> rows{{std::to_string(targets) + " targets", kWhite}};
     char text[64];
     std::snprintf(text, sizeof text, "residuals x %.4g", magnify_);
@@ -79,11 +78,7 @@ class Drawing {
       if (counts_[i] > 0)
         rows.emplace_back(std::string(1, kReasons[i].letter) + ": " + std::to_string(counts_[i]) + " " + kReasons[i].words,
                           kRefused);
-    double width = 0;
-    for (const auto& row : rows) width = std::max(width, Canvas::text_width(row.first, height));
-    canvas_.shade({0, 0}, {width + 2 * height, line * double(rows.size()) + height}, 0.35);
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      canvas_.text({height, height + line * double(i)}, rows[i].first, height, rows[i].second);
+    canvas_.legend(rows, 10 * unit_);
   }
 
  private:
