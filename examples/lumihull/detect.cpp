@@ -33,7 +33,8 @@ struct Seen {
   std::string drawing;
 };
 
-constexpr std::array<const char*, 5> kReasons{"no_code", "homography", "duplicate", "too_few_features", "unknown_id"};
+constexpr std::array<const char*, 6> kReasons{"no_code",          "homography", "duplicate",
+                                              "too_few_features", "unknown_id", "overexposed"};
 
 std::array<int, kReasons.size()> count_reasons(const Detections& found) {
   std::array<int, kReasons.size()> counts{};
@@ -135,6 +136,8 @@ void detect(Program& program, const Arguments& a) {
     const auto counts = count_reasons(found);
     for (std::size_t k = 0; k < counts.size(); ++k)
       if (counts[k] > 0) line += "; refused as " + std::string(kReasons[k]) + ": " + std::to_string(counts[k]);
+    if (counts[std::size_t(calib::RefusedTarget::Reason::overexposed)] > 0)
+      line += ": the paper is white beyond what the file holds, expose less";
     program.say(line);
   }
   program.say(std::to_string(targets) + " targets, " + std::to_string(features) + " points in " +

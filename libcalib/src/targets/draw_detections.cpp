@@ -26,11 +26,12 @@ struct ReasonWord {
   char letter;
   const char* words;
 };
-constexpr std::array<ReasonWord, 5> kReasons{{{Reason::no_code, 'c', "no code"},
+constexpr std::array<ReasonWord, 6> kReasons{{{Reason::no_code, 'c', "no code"},
                                               {Reason::homography, 'h', "homography"},
                                               {Reason::duplicate, 'd', "duplicate"},
                                               {Reason::too_few_features, 'f', "too few features"},
-                                              {Reason::unknown_id, 'u', "unknown id"}}};
+                                              {Reason::unknown_id, 'u', "unknown id"},
+                                              {Reason::overexposed, 'o', "overexposed"}}};
 
 class Drawing {
  public:
