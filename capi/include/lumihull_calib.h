@@ -208,6 +208,7 @@ LH_API lh_status lh_detections_features(lh_context *ctx, const lh_detections *de
 #define LH_REFUSED_DUPLICATE 2        /**< the id was found twice */
 #define LH_REFUSED_TOO_FEW_FEATURES 3 /**< too little of it is seen */
 #define LH_REFUSED_UNKNOWN_ID 4       /**< an id that the set does not hold */
+#define LH_REFUSED_OVEREXPOSED 5      /**< too little of it is seen, for the light about it is clipped: expose less */
 
 typedef struct lh_refused_target {
   size_t struct_size;

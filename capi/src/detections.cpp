@@ -15,7 +15,8 @@ static_assert(LH_REFUSED_NO_CODE == int(RefusedTarget::Reason::no_code) &&
               LH_REFUSED_HOMOGRAPHY == int(RefusedTarget::Reason::homography) &&
               LH_REFUSED_DUPLICATE == int(RefusedTarget::Reason::duplicate) &&
               LH_REFUSED_TOO_FEW_FEATURES == int(RefusedTarget::Reason::too_few_features) &&
-              LH_REFUSED_UNKNOWN_ID == int(RefusedTarget::Reason::unknown_id));
+              LH_REFUSED_UNKNOWN_ID == int(RefusedTarget::Reason::unknown_id) &&
+              LH_REFUSED_OVEREXPOSED == int(RefusedTarget::Reason::overexposed));
 
 namespace {
 

@@ -7,12 +7,9 @@
 #include <lumihull/calib/ink_key.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
-#include <filesystem>
 #include <iostream>
 #include <optional>
-#include <set>
 
 #include "program.h"
 
@@ -20,7 +17,6 @@ namespace lumihull::program {
 
 namespace {
 
-namespace fs = std::filesystem;
 using calib::Detection;
 using calib::Detections;
 
@@ -35,28 +31,10 @@ struct Seen {
   std::string drawing;
 };
 
-constexpr std::array<const char*, 5> kReasons{"no_code", "homography", "duplicate", "too_few_features", "unknown_id"};
-
-std::array<int, kReasons.size()> count_reasons(const Detections& found) {
-  std::array<int, kReasons.size()> counts{};
-  for (const auto& r : found.refused)
-    if (std::size_t(r.reason) < counts.size()) ++counts[std::size_t(r.reason)];
+std::vector<int> count_reasons(const Detections& found) {
+  std::vector<int> counts(calib::refusal_names().size(), 0);
+  for (const auto& r : found.refused) ++counts.at(std::size_t(r.reason));
   return counts;
-}
-
-/// NAME.png for each photograph; a number behind where names come twice.
-std::vector<std::string> drawing_names(const Arguments& a) {
-  std::vector<std::string> names;
-  std::set<std::string> taken;
-  for (const std::string& photo : a.photos) {
-    const std::string stem = fs::path(photo).stem().string();
-    std::string name = stem + ".png";
-    for (int i = 2; !taken.insert(name).second; ++i) name = stem + "-" + std::to_string(i) + ".png";
-    names.push_back((fs::path(a.draw) / name).string());
-    if (fs::exists(names.back()) && fs::equivalent(names.back(), photo))
-      throw Error(ErrorCode::invalid_argument, "the drawing would replace the photograph; name another folder", photo);
-  }
-  return names;
 }
 
 void detect(Program& program, const Arguments& a) {
@@ -65,10 +43,7 @@ void detect(Program& program, const Arguments& a) {
   if (!a.ink_key.empty()) options.ink_key = calib::ColorKey::load(a.ink_key, job);
   const calib::TargetDetector detector(calib::TargetSet::from_text(a.targets), options);
   std::vector<std::string> drawings;
-  if (!a.draw.empty()) {
-    fs::create_directories(a.draw);
-    drawings = drawing_names(a);
-  }
+  if (!a.draw.empty()) drawings = drawing_names(a.draw, a.photos);
 
   std::optional<calib::InkSamples> ink;
   if (!a.learn_ink_key.empty()) ink.emplace();
@@ -113,7 +88,10 @@ void detect(Program& program, const Arguments& a) {
     std::string line = a.photos[i] + ": " + std::to_string(found.targets.size()) + " targets";
     const auto counts = count_reasons(found);
     for (std::size_t k = 0; k < counts.size(); ++k)
-      if (counts[k] > 0) line += "; refused as " + std::string(kReasons[k]) + ": " + std::to_string(counts[k]);
+      if (counts[k] > 0)
+        line += "; refused as " + std::string(calib::refusal_names()[k]) + ": " + std::to_string(counts[k]);
+    if (counts[std::size_t(calib::RefusedTarget::Reason::overexposed)] > 0)
+      line += ": the paper is white beyond what the file holds, expose less";
     program.say(line);
   }
   program.say(std::to_string(targets) + " targets, " + std::to_string(features) + " points in " +

@@ -102,34 +102,16 @@ std::vector<PhotoViews> find_targets(Program& program, const Arguments& a) {
   return all;
 }
 
-void draw_line(Image& picture, Eigen::Vector2d from, const Eigen::Vector2d& to, const std::uint8_t (&rgb)[3]) {
-  const double length = (to - from).norm();
-  const int steps = int(std::min(1e5, 2 * length)) + 1;
-  for (int i = 0; i <= steps; ++i) {
-    const Eigen::Vector2d p = from + (to - from) * (double(i) / steps);
-    if (!(p.x() >= 0 && p.y() >= 0 && p.x() < picture.width() && p.y() < picture.height())) continue;
-    std::copy_n(rgb, 3, picture.row<std::uint8_t>(int(p.y())) + 3 * int(p.x()));
-  }
-}
-
-/// The photograph with the points that were found: green crosses, and residuals magnified; outliers orange.
-void draw_views(const Arguments& a, const calib::LensCalibration& found, const std::vector<BoardView>& views,
-                const std::vector<std::size_t>& photo_of_view, Program& program) {
-  fs::create_directories(a.draw);
+/// The photographs with the points that were found and their residuals.
+void draw_views(const Arguments& a, const std::vector<std::string>& drawings, const calib::LensCalibration& found,
+                const std::vector<BoardView>& views, const std::vector<std::size_t>& photo_of_view, Program& program) {
   constexpr double kMagnify = 100;
   for (std::size_t photo = 0; photo < a.photos.size(); ++photo) {
     program.job().check();
-    Image picture = converted(read_image(a.photos[photo]), PixelType::u8, 3);
-    const double arm = std::max(3.0, picture.width() / 400.0);
-    for (const auto& r : found.residuals) {
-      if (photo_of_view[std::size_t(r.view)] != photo) continue;
-      const Eigen::Vector2d px = views[std::size_t(r.view)].matches[std::size_t(r.match)].pixel;
-      constexpr std::uint8_t kGood[3] = {40, 230, 80}, kWrong[3] = {255, 110, 20}, kError[3] = {255, 40, 200};
-      for (const Eigen::Vector2d& d : {Eigen::Vector2d(arm, 0), Eigen::Vector2d(0, arm)})
-        r.outlier ? draw_line(picture, px - d, px + d, kWrong) : draw_line(picture, px - d, px + d, kGood);
-      if (r.error.allFinite()) draw_line(picture, px, px + kMagnify * r.error, kError);
-    }
-    write_png(fs::path(a.draw) / (fs::path(a.photos[photo]).stem().string() + ".png"), picture);
+    std::vector<int> shown;
+    for (std::size_t v = 0; v < views.size(); ++v)
+      if (photo_of_view[v] == photo) shown.push_back(int(v));
+    write_png(drawings[photo], calib::draw_residuals(read_image(a.photos[photo]), found, views, shown, kMagnify));
   }
   program.say("drawings  " + a.draw + ": residuals 100 times as large");
 }
@@ -174,6 +156,8 @@ void say_result(Program& program, const calib::LensCalibration& found) {
 void run(Program& program, const Arguments& a) {
   const calib::LensCalibrationOptions options = options_of(a);
   options.validate();
+  std::vector<std::string> drawings;
+  if (!a.draw.empty()) drawings = drawing_names(a.draw, a.photos);
   std::vector<PhotoViews> shown = find_targets(program, a);
   std::vector<BoardView> views;
   std::vector<std::size_t> photo_of_view;
@@ -207,7 +191,7 @@ void run(Program& program, const Arguments& a) {
     write_file(a.report, calib::lens_report_html(found, views, "Lens calibration"));
     program.say("report    " + a.report);
   }
-  if (!a.draw.empty()) draw_views(a, found, views, photo_of_view, program);
+  if (!a.draw.empty()) draw_views(a, drawings, found, views, photo_of_view, program);
   if (program.json) std::cout << calib::intrinsics_json(found);
 }
 

@@ -10,8 +10,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <new>
+#include <set>
 
 namespace lumihull::program {
 
@@ -261,6 +263,24 @@ void add_stage_verb(Program& program, const std::string& stage, const std::strin
   a->options = std::make_unique<StageFlags>(
       verb, stage == "run" ? std::vector<std::string_view>(all.begin(), all.end())
                            : std::vector<std::string_view>{*std::find(all.begin(), all.end(), stage)});
+}
+
+std::vector<std::string> drawing_names(const std::string& folder, const std::vector<std::string>& photos) {
+  namespace fs = std::filesystem;
+  fs::create_directories(folder);
+  std::vector<std::string> names;
+  std::set<std::string> taken;
+  for (const std::string& photo : photos) {
+    const std::string stem = fs::path(photo).stem().string();
+    std::string name = stem + ".png";
+    for (int i = 2; !taken.insert(name).second; ++i) name = stem + "-" + std::to_string(i) + ".png";
+    names.push_back((fs::path(folder) / name).string());
+  }
+  for (const std::string& name : names)
+    for (const std::string& photo : photos)
+      if (fs::exists(name) && fs::exists(photo) && fs::equivalent(name, photo))
+        throw Error(ErrorCode::invalid_argument, "the drawing would replace the photograph; name another folder", photo);
+  return names;
 }
 
 std::string json_text(const std::string& s) {

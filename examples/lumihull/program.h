@@ -73,6 +73,10 @@ class StageFlags {
 void add_stage_verb(Program& program, const std::string& stage, const std::string& help,
                     std::function<std::string(const Capture&)> json = {});
 
+/// Makes a folder for drawings and names them FOLDER/NAME.png after the photographs, with a number behind where names
+/// come twice. Errors: invalid_argument (a drawing would replace a photograph), io.
+std::vector<std::string> drawing_names(const std::string& folder, const std::vector<std::string>& photos);
+
 std::string json_text(const std::string& s);  ///< s as a JSON string, with its quotes
 
 // One function a verb, each in the file of its name.

@@ -146,7 +146,7 @@ void clutters(int pictures, int first, const std::vector<std::string>& files) {
   for (const char* family : {"paper4x4", "matrix5x5", "matrix6x6"}) set.designs.push_back(test::design_of(family));
   const TargetDetector detector(set);
   Job job({}, 2);
-  int found = 0, refused[5] = {};
+  int found = 0, refused[6] = {};
   const auto look = [&](const Image& picture, const std::string& name) {
     const Detections d = detector.detect(picture, job);
     for (const RefusedTarget& r : d.refused) ++refused[std::size_t(r.reason)];

@@ -218,7 +218,7 @@ void show(const Family& family, std::size_t i, const fs::path& out) {
   for (const calib::Detection& t : found.targets)
     std::printf("  id %d, %zu features, corrected %d, erased %d, rms %.3f px\n", t.id, t.features.size(), t.corrected,
                 t.erased, t.rms_px);
-  const char* reasons[] = {"no code", "homography", "duplicate", "too few features", "unknown id"};
+  const char* reasons[] = {"no code", "homography", "duplicate", "too few features", "unknown id", "overexposed"};
   for (const calib::RefusedTarget& t : found.refused)
     std::printf("  refused: %s at (%.1f, %.1f), %.1f px, id %d\n", reasons[std::size_t(t.reason)], t.pixel.x(),
                 t.pixel.y(), t.size_px, t.id);

@@ -510,7 +510,9 @@ class Detection:
 
 class RefusedTarget:
     @property
-    def reason(self) -> Literal["no_code", "homography", "duplicate", "too_few_features", "unknown_id"]: ...
+    def reason(
+        self,
+    ) -> Literal["no_code", "homography", "duplicate", "too_few_features", "unknown_id", "overexposed"]: ...
     @property
     def pixel(self) -> NDArray[np.float64]: ...
     @property

@@ -29,6 +29,8 @@ const char* word(RefusedTarget::Reason reason) {
       return "too_few_features";
     case RefusedTarget::Reason::unknown_id:
       return "unknown_id";
+    case RefusedTarget::Reason::overexposed:
+      return "overexposed";
   }
   return "";
 }

@@ -14,7 +14,8 @@ namespace {
 using lumihull::internal::Json;
 using lumihull::internal::JsonReader;
 
-constexpr std::array<const char*, 5> kReasons{"no_code", "homography", "duplicate", "too_few_features", "unknown_id"};
+constexpr std::array<std::string_view, 6> kReasons{"no_code",          "homography", "duplicate",
+                                                   "too_few_features", "unknown_id", "overexposed"};
 constexpr const char* kFormat = "lumihull-detections";
 constexpr std::int64_t kVersion = 1;
 constexpr std::size_t kMostTargets = 100'000;
@@ -100,11 +101,13 @@ Detection read_target(const JsonReader& json, const TargetSet& set) {
 
 }  // namespace
 
+std::span<const std::string_view> refusal_names() { return kReasons; }
+
 std::string detections_json(const TargetSet& set, const PhotoDetections& detections) {
   Json targets = Json::array(), refused = Json::object();
   for (const Detection& d : detections.found.targets) targets.push_back(print_target(set, d));
   for (std::size_t i = 0; i < kReasons.size(); ++i)
-    refused[kReasons[i]] =
+    refused[std::string(kReasons[i])] =
         std::count_if(detections.found.refused.begin(), detections.found.refused.end(),
                       [&](const RefusedTarget& r) { return std::size_t(r.reason) == i; });
   const Json json{{"photo", detections.photo},
@@ -139,8 +142,8 @@ KeptDetections parse_detections(std::string_view text, const std::string& name, 
 }
 
 std::string print_detections(const TargetSet& set, const KeptDetections& kept) {
-  return "{\"format\": \"" + std::string(kFormat) + "\", \"version\": " + std::to_string(kVersion) +
-         ", \"key\": \"" + kept.key + "\", \"detections\":\n" + detections_json(set, kept.detections) + "}\n";
+  return "{\"format\": \"" + std::string(kFormat) + "\", \"version\": " + std::to_string(kVersion) + ", \"key\": \"" +
+         kept.key + "\", \"detections\":\n" + detections_json(set, kept.detections) + "}\n";
 }
 
 }  // namespace internal

@@ -40,7 +40,7 @@ std::string vectors(const LensCalibration& c, const std::vector<Seen>& seen) {
     Eigen::Vector2d tip = times * s.error;
     if (tip.norm() > 0.1 * w) tip *= 0.1 * w / tip.norm();
     figure.line(s.pixel.x(), s.pixel.y(), s.pixel.x() + tip.x(), s.pixel.y() + tip.y(), s.outlier ? "wrong" : "arrow");
-    figure.dot(s.pixel.x(), s.pixel.y(), 1.2, s.outlier ? "outlier" : "point");
+    figure.dot(s.pixel.x(), s.pixel.y(), 1.6, s.outlier ? "outlier" : "point");
   }
   // What is systematic stands out in means: 10 cells across, where there are at least 5 points.
   constexpr int kColumns = 10, kRows = 8;
@@ -105,10 +105,11 @@ std::string by_view(const LensCalibration& c, std::span<const BoardView> views, 
     if (n[i] > 0) most = std::max(most, std::sqrt(sum[i] / n[i]));
   SvgFigure figure("RMS of each view", 760, 300);
   figure.note("dashed: of all points that count");
-  figure.axes(0, double(views.size()), 0, 1.1 * most, "view", "RMS, px");
+  const double last = double(views.size()) - 0.5;  // a bar stands about its view's number
+  figure.axes(-0.5, last, 0, 1.1 * most, "view", "RMS, px", 1);
   for (std::size_t i = 0; i < views.size(); ++i)
-    if (n[i] > 0) figure.box(double(i) + 0.15, 0, double(i) + 0.85, std::sqrt(sum[i] / n[i]), "bar");
-  figure.line(0, c.rms_px, double(views.size()), c.rms_px, "level");
+    if (n[i] > 0) figure.box(double(i) - 0.35, 0, double(i) + 0.35, std::sqrt(sum[i] / n[i]), "bar");
+  figure.line(-0.5, c.rms_px, last, c.rms_px, "level");
   return figure.str();
 }
 

@@ -65,9 +65,9 @@ double SvgFigure::y_of(double y) const {
 }
 
 void SvgFigure::axes(double x0, double x1, double y0, double y1, const std::string& x_label,
-                     const std::string& y_label) {
+                     const std::string& y_label, double least_step) {
   x0_ = x0, x1_ = x1 != x0 ? x1 : x0 + 1, y0_ = y0, y1_ = y1 != y0 ? y1 : y0 + 1;
-  const double dx = tick_step(std::abs(x1_ - x0_), 8), dy = tick_step(std::abs(y1_ - y0_), 6);
+  const double dx = std::max(least_step, tick_step(std::abs(x1_ - x0_), 8)), dy = tick_step(std::abs(y1_ - y0_), 6);
   const double left = std::min(x0_, x1_), right = std::max(x0_, x1_), low = std::min(y0_, y1_),
                high = std::max(y0_, y1_);
   for (double i = std::ceil(left / dx - 1e-9); i * dx <= right + 1e-9 * dx; ++i) {

@@ -25,8 +25,9 @@ class SvgFigure {
  public:
   SvgFigure(std::string title, double width, double height);
 
-  /// Draws frame, ticks and labels, and sets the scale of what follows.
-  void axes(double x0, double x1, double y0, double y1, const std::string& x_label, const std::string& y_label);
+  /// Draws frame, ticks and labels, and sets the scale of what follows. least_step: between ticks along x.
+  void axes(double x0, double x1, double y0, double y1, const std::string& x_label, const std::string& y_label,
+            double least_step = 0);
   void line(double x0, double y0, double x1, double y1, std::string_view style);
   void dot(double x, double y, double radius_px, std::string_view style);
   /// Corners in data; `style` a class, or a colour where it begins with '#'.

@@ -79,6 +79,15 @@ void Canvas::shade(const Eigen::Vector2d& low, const Eigen::Vector2d& high, doub
   }
 }
 
+void Canvas::legend(std::span<const std::pair<std::string, Rgb>> rows, double height) {
+  const double line = 1.7 * height;
+  double width = 0;
+  for (const auto& row : rows) width = std::max(width, text_width(row.first, height));
+  shade({0, 0}, {width + 2 * height, line * double(rows.size()) + height}, 0.35);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    text({height, height + line * double(i)}, rows[i].first, height, rows[i].second);
+}
+
 double Canvas::text_width(std::string_view words, double height) {
   return words.empty() ? 0 : (kAdvance * double(words.size()) - 2) * height / 6;
 }

@@ -5,7 +5,9 @@
 
 #include <Eigen/Core>
 #include <span>
+#include <string>
 #include <string_view>
+#include <utility>
 
 namespace lumihull::calib {
 
@@ -25,6 +27,8 @@ class Canvas {
   /// upper left corner is `at`.
   void text(const Eigen::Vector2d& at, std::string_view words, double height, const Rgb& color);
   static double text_width(std::string_view words, double height);
+  /// Lines of text on a panel in the upper left corner.
+  void legend(std::span<const std::pair<std::string, Rgb>> rows, double height);
 
  private:
   void strokes(const Eigen::Vector2d& at, std::string_view words, double height, double width, const Rgb& color);

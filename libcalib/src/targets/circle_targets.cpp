@@ -292,7 +292,10 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
                       ? EllipseState::good
                       : states[i];
   }
-  if (good < 6 || good * 5 < 3 * int(n)) return refuse(RefusedTarget::Reason::too_few_features);
+  const auto clipped = std::count(states.begin(), states.end(), EllipseState::saturated);
+  const auto too_few =
+      2 * clipped > int(n) - good ? RefusedTarget::Reason::overexposed : RefusedTarget::Reason::too_few_features;
+  if (good < 6 || good * 5 < 3 * int(n)) return refuse(too_few);
 
   // Read.
   const CellReading reading = read_cells(plane, circles, readable, grid, 2 * grid - 1, look);
@@ -373,11 +376,11 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
       if (each[i] <= limit) kept.push_back(features[i]);
     if (kept.size() == features.size()) break;
     features = std::move(kept);
-    if (features.size() * 5 < 3 * n) return refuse(RefusedTarget::Reason::too_few_features);
+    if (features.size() * 5 < 3 * n) return refuse(too_few);
   }
   // Smooth distortion leaves an error that grows with the target; without check bits there is less to give away.
   if (!(target.rms_px < (checked ? 0.035 : 0.02) * pitch_px + 0.1)) return refuse(RefusedTarget::Reason::homography);
-  if (!checked && features.size() < n) return refuse(RefusedTarget::Reason::too_few_features);
+  if (!checked && features.size() < n) return refuse(too_few);
   if (!checked && reading.dark_spread > 0.15) return refuse(RefusedTarget::Reason::no_code);
   target.pixel_from_target = h / h.norm();
   target.features = std::move(features);

@@ -90,14 +90,16 @@ void ContourFit::expect(const ContourModel& model, double inner_ratio) {
 
 void ContourFit::weigh() {
   pixels_ = clipped_ = 0;
-  const double scale = noise_scale_ * noise_scale_;
+  const double scale = noise_scale_ * noise_scale_, limit = double(plane_.saturation),
+               limit_noise = std::sqrt(plane_.noise.variance(limit));
   for (Block& block : blocks_)
     for (int i = 0; i < kLanes; ++i) {
       const double v = double(block.expected[i]), jitter = jitter_px_ * double(block.slope[i]);
       const double variance = std::max(1e-14, scale * plane_.noise.variance(v)) + jitter * jitter;
-      // By the model, not only by the value: to leave out those that noise has lifted would pull the level down.
-      const bool clipped =
-          block.value[i] >= plane_.saturation || v > double(plane_.saturation) - 2 * std::sqrt(variance);
+      // By the model, not only by the value: to leave out those that noise has lifted would pull the level down. What is
+      // far below the limit is not clipped, whatever the model says: else it could explain all by light beyond it.
+      const bool clipped = block.value[i] >= plane_.saturation ||
+                           (v > limit - 2 * std::sqrt(variance) && double(block.value[i]) > limit - 5 * limit_noise);
       const bool counts = i < block.count && !clipped && sectors_[block.sector[std::size_t(i)]].used;
       block.variance[i] = float(variance);
       block.weight[i] = counts ? float(1 / variance) : 0.0f;

@@ -26,11 +26,12 @@ struct ReasonWord {
   char letter;
   const char* words;
 };
-constexpr std::array<ReasonWord, 5> kReasons{{{Reason::no_code, 'c', "no code"},
+constexpr std::array<ReasonWord, 6> kReasons{{{Reason::no_code, 'c', "no code"},
                                               {Reason::homography, 'h', "homography"},
                                               {Reason::duplicate, 'd', "duplicate"},
                                               {Reason::too_few_features, 'f', "too few features"},
-                                              {Reason::unknown_id, 'u', "unknown id"}}};
+                                              {Reason::unknown_id, 'u', "unknown id"},
+                                              {Reason::overexposed, 'o', "overexposed"}}};
 
 class Drawing {
  public:
@@ -70,7 +71,6 @@ class Drawing {
   }
 
   void legend(std::size_t targets) {
-    const double height = 10 * unit_, line = 1.7 * height;
     std::vector<std::pair<std::string, Rgb>> rows{{std::to_string(targets) + " targets", kWhite}};
     char text[64];
     std::snprintf(text, sizeof text, "residuals x %.4g", magnify_);
@@ -79,11 +79,7 @@ class Drawing {
       if (counts_[i] > 0)
         rows.emplace_back(std::string(1, kReasons[i].letter) + ": " + std::to_string(counts_[i]) + " " + kReasons[i].words,
                           kRefused);
-    double width = 0;
-    for (const auto& row : rows) width = std::max(width, Canvas::text_width(row.first, height));
-    canvas_.shade({0, 0}, {width + 2 * height, line * double(rows.size()) + height}, 0.35);
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      canvas_.text({height, height + line * double(i)}, rows[i].first, height, rows[i].second);
+    canvas_.legend(rows, 10 * unit_);
   }
 
  private:

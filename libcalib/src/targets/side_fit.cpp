@@ -29,7 +29,7 @@ struct Sample {
   double window;  ///< the corners' part: share of the dark that the neighbouring sides leave
   double behind;  ///< share of light that leaks in from the cells behind the border
   int part;
-  double weight = 1;  ///< 1 / variance
+  double weight = 1;  ///< 1 / variance; 0: clipped, which says nothing but how much it is at least
 };
 
 double bilinear(const Image& values, double x, double y) {
@@ -146,7 +146,7 @@ Normal normal_equations(const SideCurve& side, const SideBand& band, const std::
   const SideModel model(side, p, band.light_slope);
   alignas(32) double a[kParameters][kParameters] = {}, b[kParameters] = {};
   for (const Sample& s : samples) {
-    if (!used[std::size_t(s.part)]) continue;
+    if (!used[std::size_t(s.part)] || s.weight == 0) continue;
     const Model m = model.at(s);
     const double weight = s.weight, r = s.value - m.value;
     for (std::size_t i = 0; i < kParameters; ++i) {
@@ -198,15 +198,20 @@ bool start_levels(const SideCurve& side, const SideBand& band, const std::vector
 void weigh(const LightPlane& plane, const SideCurve& side, const SideBand& band, const std::vector<char>& used,
            const Vector& p, std::vector<Sample>& samples) {
   const SideModel model(side, p, band.light_slope);
+  const double limit = double(plane.saturation), limit_sd = std::sqrt(plane.noise.variance(limit));
+  std::vector<double> variances;
   double excess = 0;
   int count = 0;
   for (Sample& s : samples) {
     const double v = model.at(s).value, r = s.value - v, noise = plane.noise.variance(v);
-    s.weight = noise;
-    if (used[std::size_t(s.part)]) excess += r * r - noise, ++count;
+    // By the model, too: to leave out only those that noise has lifted would pull the level down.
+    const bool clipped = s.value >= limit || (v > limit - 2 * limit_sd && s.value > limit - 5 * limit_sd);
+    s.weight = clipped ? 0 : 1;
+    variances.push_back(noise);
+    if (used[std::size_t(s.part)] && !clipped) excess += r * r - noise, ++count;
   }
   excess = count > 0 ? std::max(0.0, excess / count) : 0;
-  for (Sample& s : samples) s.weight = 1 / (s.weight + excess);
+  for (std::size_t i = 0; i < samples.size(); ++i) samples[i].weight /= variances[i] + excess;
 }
 
 /// Levenberg-Marquardt; false where it does not come to rest near its start.
@@ -246,6 +251,7 @@ int drop_disturbed(const SideCurve& side, const SideBand& band, const std::vecto
   std::vector<int> count(used.size(), 0);
   const SideModel model(side, p, band.light_slope);
   for (const Sample& s : samples) {
+    if (s.weight == 0) continue;
     const double r = s.value - model.at(s).value;
     chi2[std::size_t(s.part)] += r * r * s.weight;
     ++count[std::size_t(s.part)];
@@ -380,13 +386,6 @@ std::optional<SideFit> fit_side(const LightPlane& plane, const SideCurve& start,
   fit.dark = p[3], fit.light = p[5], fit.blur_px = p[7];
   fit.light_slope = p[6] / (0.5 * side.length) / p[5];
   fit.visible = double(std::count(used.begin(), used.end(), 1)) / double(used.size());
-  int paper = 0, clipped = 0;
-  for (const Sample& s : samples) {
-    if (s.d <= side.offset(s.u)) continue;
-    ++paper;
-    clipped += s.value >= double(plane.saturation);
-  }
-  fit.saturated = paper > 0 ? double(clipped) / paper : 0;
   return fit;
 }
 

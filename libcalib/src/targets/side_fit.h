@@ -61,7 +61,6 @@ struct SideFit {
   double dark_variance = 0, light_variance = 0, blur_variance = 0;
   double residual = 0;         ///< RMS residual / expected noise
   double visible = 1;          ///< share of the side that was used
-  double saturated = 0;        ///< share of the paper's pixels that are clipped
 };
 
 /// Finds the side within `reach_px` of the chord by profiles across it, to a fraction of a px. nullopt: no edge from dark
@@ -70,7 +69,8 @@ std::optional<SideCurve> find_side(const LightPlane& plane, const SideCurve& cho
                                    double curvature_sd);
 
 /// Maximum-likelihood fit of a side with its edge profile (EdgeProfile), two levels that may change along it, and its
-/// curvature, to the pixels in a band around the chord that are away from the corners; each weighted by its noise.
+/// curvature, to the pixels in a band around the chord that are away from the corners; each weighted by its noise. Clipped
+/// pixels do not count: where all of the paper is clipped the lower part of the edge says where it is.
 /// Parts whose residuals stand out are left out. The covariance is that of the fit, times chi² / freedom where that is
 /// above 1. nullopt: too few pixels, or the iteration left the neighbourhood of `start`.
 std::optional<SideFit> fit_side(const LightPlane& plane, const SideCurve& start, const SideBand& band,

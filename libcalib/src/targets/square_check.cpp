@@ -62,6 +62,12 @@ SquareReading read_square(const LightPlane& plane, const Eigen::Matrix3d& pixel_
   const double blur = std::sqrt(blur_px * blur_px + 2.0 / 12);
   const auto across = blur_weights(blur / size_u), down = blur_weights(blur / size_v);
 
+  // Paper that is clipped is seen as light as the file holds.
+  const double top = std::min(levels.light, double(plane.saturation) / levels.shade(pixel(middle, middle))),
+               contrast = top - levels.dark, beyond = (levels.light - levels.dark) / contrast;
+  SquareReading best;
+  best.rms = best.worst = 1;
+  if (!(contrast > 0)) return best;
   std::vector<double> seen(std::size_t(wide * wide));
   const int places = std::clamp(int(std::ceil(std::max(size_u, size_v))), 3, 7);
   for (int y = 0; y < wide; ++y)
@@ -78,10 +84,9 @@ SquareReading read_square(const LightPlane& plane, const Eigen::Matrix3d& pixel_
           sum += value, ++count;
         }
       seen[std::size_t(y * wide + x)] =
-          count > 0 ? (sum / count - levels.dark) / (levels.light - levels.dark) : std::nan("");
+          count > 0 ? (sum / count - levels.dark) / contrast : std::nan("");
     }
 
-  SquareReading best;
   double least = 1e300;
   std::vector<double> expected(std::size_t(wide * wide)), rows(std::size_t(wide * wide));
   for (int turn = 0; turn < 4; ++turn) {
@@ -113,7 +118,7 @@ SquareReading read_square(const LightPlane& plane, const Eigen::Matrix3d& pixel_
         const std::size_t i = std::size_t(y * wide + x);
         const bool paper = x < 1 || y < 1 || x > grid || y > grid;
         if (paper && std::isnan(seen[i])) continue;  // beyond the picture
-        const double off = std::isfinite(seen[i]) ? seen[i] - expected[i] : 1;
+        const double off = std::isfinite(seen[i]) ? seen[i] - std::min(1.0, beyond * expected[i]) : 1;
         all += off * off;
         const bool data = x > 1 && y > 1 && x < grid && y < grid;
         if (data && std::abs(off) > 0.5) {

@@ -261,6 +261,32 @@ TEST(Detect, WhitePaperBlackInkAndOtherColours) {
   EXPECT_EQ(detect(wall.photo(), set_of(wall.designs)).targets.size(), 1u);
 }
 
+TEST(Detect, PaperThatIsClipped) {
+  for (const char* family : {"paper4x4", "matrix5x5"}) {
+    TargetDesign design = test::design_of(family);
+    design.ink = {20, 20, 20}, design.paper = {255, 255, 255};
+    for (const double exposure : {1.0, 1.2, 1.6})
+      for (const double size : {9.0, 16.0}) {
+        SCOPED_TRACE(std::string(family) + ", " + std::to_string(exposure) + ", " + std::to_string(size) + " px");
+        rig::PrintPhotoOptions options;
+        options.blur_px = exposure == 1 ? 0.3 : 0.7;  // one without noise: as a program would draw the sheet
+        options.exposure = exposure;
+        options.noise_read = exposure == 1 ? 0 : 0.007;
+        const auto one = test::one_target(design, size, 0.5, options, std::uint64_t(100 * exposure + size));
+        const Detections found = detect(one.photo, set_of({design}));
+        ASSERT_EQ(ids_of(found), std::vector<int>{one.target.id});
+        EXPECT_LT(test::center_error(one.camera, design, one.target, found.targets[0]), 0.03);
+        // Where that is not wanted a word says what is wrong.
+        DetectOptions strict;
+        strict.ellipse.max_saturated = 0.1;
+        const Detections none = detect(one.photo, set_of({design}), strict);
+        EXPECT_TRUE(none.targets.empty());
+        ASSERT_FALSE(none.refused.empty());
+        EXPECT_EQ(none.refused[0].reason, RefusedTarget::Reason::overexposed);
+      }
+  }
+}
+
 TEST(Detect, ABrightBackground) {
   Wall wall;
   for (int i = 0; i < 4; ++i)

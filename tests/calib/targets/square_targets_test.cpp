@@ -32,6 +32,7 @@ struct Setting {
   int times = 12;
   Eigen::Vector2d shade{0, 0};
   double bend = 0;  // radial distortion: px at 100 px from the middle of the picture's corner
+  double paper = 0.8;
 };
 
 struct Study {
@@ -54,7 +55,7 @@ Study study_of(const Setting& setting) {
   Study study;
   for (int i = 0; i < setting.times; ++i) {
     const int size = int(2 * setting.side) + 60;
-    SquareScene scene(size, size);
+    SquareScene scene(size, size, setting.paper);
     const int id = family.ids()[random() % family.ids().size()];
     const Eigen::Vector2d middle(size / 2.0 + uniform(random), size / 2.0 + uniform(random));
     const double tilt = setting.most_tilt * std::numbers::pi / 180 * uniform(random);
@@ -122,6 +123,18 @@ TEST(SquareTargets, CornersAreUnbiasedInUnevenLightAndThroughABendingLens) {
   const Study bent = study_of({.side = 80, .bend = 1.0});
   EXPECT_EQ(bent.found, bent.shown);
   EXPECT_LT(bent.rms(), 0.006);
+}
+
+TEST(SquareTargets, PaperThatIsClipped) {
+  for (const double paper : {1.05, 1.3, 1.6}) {
+    const Study s = study_of({.side = 60, .blur = .8, .noise = .007, .times = 20, .paper = paper});
+    std::printf("paper %.2f: rms %.4f px, expected %.4f, inwards %.4f, mahalanobis² %.2f\n", paper, s.rms(), s.predicted,
+                s.inward.x(), s.mahalanobis);
+    EXPECT_GE(s.found, s.shown - 1) << paper;
+    EXPECT_EQ(s.wrong, 0) << paper;
+    EXPECT_LT(s.rms(), 0.06) << paper;  // taken for paper that is just white: 0.1 to 0.6 px inwards
+    EXPECT_LT(s.mahalanobis, 5) << paper;
+  }
 }
 
 TEST(SquareTargets, CovariancesAreTrue) {

@@ -33,7 +33,14 @@ struct Detection {
 
 /// Why something that looked like a target was refused.
 struct RefusedTarget {
-  enum class Reason : std::uint8_t { no_code, homography, duplicate, too_few_features, unknown_id };
+  enum class Reason : std::uint8_t {
+    no_code,           ///< its cells are no id of its family
+    homography,        ///< its points do not lie as printed
+    duplicate,         ///< the id was found twice, or something else in its place
+    too_few_features,  ///< too little of it could be measured
+    unknown_id,        ///< an id that the set does not hold
+    overexposed,       ///< too little of it could be measured, for the light about it is clipped: expose less
+  };
   Reason reason = Reason::no_code;
   Eigen::Vector2d pixel{0, 0};
   double size_px = 0;

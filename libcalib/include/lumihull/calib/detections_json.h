@@ -4,9 +4,14 @@
 #include <lumihull/calib/detection.h>
 #include <lumihull/calib/target_set.h>
 
+#include <span>
 #include <string>
+#include <string_view>
 
 namespace lumihull::calib {
+
+/// Names of RefusedTarget::Reason, in their order: "no_code", …
+LUMIHULL_API std::span<const std::string_view> refusal_names();
 
 /// What was found in one photograph.
 struct PhotoDetections {

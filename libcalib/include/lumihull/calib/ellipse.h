@@ -56,7 +56,9 @@ struct EllipseFit {
 struct LUMIHULL_API EllipseOptions {
   double gradient_sigma_px = 1;   ///< of the derivative of a Gaussian, 0.5 … 5
   double min_visible = 0.6;       ///< of the contour, 0 … 1
-  double max_saturated = 0.1;     ///< of the contour's neighbourhood, 0 … 1
+  /// Of the contour's neighbourhood, 0 … 1. Clipped pixels are left out; where all of the paper is clipped the lower part
+  /// of the edge still says where the contour is.
+  double max_saturated = 0.9;
   double min_contrast_noise = 5;  ///< contrast over noise, below which nothing is measured
   /// Of a ring: diameter of the concentric inner contour over that of the one that is measured, 0 … 0.9. 0: a disc.
   double inner_ratio = 0;

@@ -2,6 +2,7 @@
 
 #include <lumihull/base/api.h>
 #include <lumihull/base/camera.h>
+#include <lumihull/base/image.h>
 #include <lumihull/base/job.h>
 #include <lumihull/base/pose.h>
 
@@ -86,6 +87,12 @@ LUMIHULL_API std::vector<double> projection_uncertainty(const LensCalibration& c
 /// bad_input (camera).
 LUMIHULL_API std::string lens_report_html(const LensCalibration& calibration, std::span<const BoardView> views,
                                           const std::string& title);
+
+/// The photograph (as 8-bit RGB) with the points of the views that it shows: green crosses, orange ones for outliers, and
+/// residuals (measured - predicted) magnified `magnify` times. shown: indices into `views`, which are those that were
+/// calibrated from. Errors: invalid_argument (an empty picture, other views, not finite).
+LUMIHULL_API Image draw_residuals(const Image& photo, const LensCalibration& calibration,
+                                  std::span<const BoardView> views, std::span<const int> shown, double magnify = 100);
 
 /// Text of a file ("lumihull-intrinsics", version 1): camera, covariance, what was measured. Errors: bad_input (a
 /// problem's text is not UTF-8).
