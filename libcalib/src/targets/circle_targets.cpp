@@ -223,6 +223,7 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   const std::size_t n = window.blob.size();
   const double radius = design.circle_radius_m();
   const std::vector<Vector2d> points = plane_points(grid, design.size_m);
+  const bool checked = design.family.name() != "paper4x4";
   WindowResult result;
 
   std::vector<Vector2d> from, to;
@@ -350,8 +351,24 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   }
   std::sort(features.begin(), features.end(), [](const Feature& a, const Feature& b) { return a.index < b.index; });
 
+  // Without check bits a circle that was read and not measured has to be a whole one where it belongs: a thing that
+  // covers a part of it would be read instead.
+  const auto all_in_place = [&](const Matrix3d& pixel_from_plane, const std::vector<Feature>& measured) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const int index = upright(i);
+      if (std::any_of(measured.begin(), measured.end(), [&](const Feature& f) { return f.index == index; })) continue;
+      const std::optional<Ellipse> expected =
+          seen_circle(pixel_from_plane, printed.feature(index), printed.circle_radius_m());
+      if (!expected || window.blob[i] < 0) return false;
+      const Ellipse seen = ellipse_of(blobs[std::size_t(window.blob[i])]);
+      const double area = seen.a * seen.b / (expected->a * expected->b);
+      if (!((seen.center - expected->center).norm() < 0.1 * expected->b + 0.3) || !(area > 0.75 && area < 1.33))
+        return false;
+    }
+    return true;
+  };
+
   // Features that don't keep to the plane by far (a disturbed contour) go; what is smooth, distortion, stays.
-  const bool checked = design.family.name() != "paper4x4";
   for (int round = 0; round < 3; ++round) {
     from.clear(), to.clear();
     for (const Feature& f : features) {
@@ -377,7 +394,8 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   }
   // Smooth distortion leaves an error that grows with the target; without check bits there is less to give away.
   if (!(target.rms_px < (checked ? 0.035 : 0.02) * pitch_px + 0.1)) return refuse(RefusedTarget::Reason::homography);
-  if (!checked && features.size() < n) return refuse(RefusedTarget::Reason::too_few_features);
+  if (!checked && !(features.size() * 4 >= 3 * n && all_in_place(h, features)))
+    return refuse(RefusedTarget::Reason::too_few_features);
   if (!checked && reading.dark_spread > 0.15) return refuse(RefusedTarget::Reason::no_code);
   target.pixel_from_target = h / h.norm();
   target.features = std::move(features);

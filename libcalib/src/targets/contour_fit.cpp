@@ -396,6 +396,15 @@ void ContourFit::loosen(double most, double most_px) {
   if (seen * seen > kLeastRaise * kLeastRaise * noise) jitter_px_ = std::min(std::sqrt(seen * seen - noise), most_px);
 }
 
+bool ContourFit::loosen_more(double most, double most_px) {
+  const double raise = std::sqrt(squares_ / std::max(1, pixels_ - kSize));
+  const double noise = std::max(noise_scale_, std::min(noise_scale_ * raise, most));
+  const double jitter = std::max(jitter_px_, std::min(jitter_px_ * raise, most_px));
+  if (!(raise > kLeastRaise) || (noise == noise_scale_ && jitter == jitter_px_)) return false;
+  noise_scale_ = noise, jitter_px_ = jitter;
+  return true;
+}
+
 double ContourFit::robust_scale() {
   scratch_.clear();
   for (const Block& block : blocks_)

@@ -84,6 +84,9 @@ class ContourFit {
   /// `most_px`. For pictures whose edges are not a blurred step in linear light, whatever their smooth places say of
   /// noise: JPEG, demosaicing, sharpening, edges mixed in sRGB.
   void loosen(double most, double most_px);
+  /// The same by the RMS of the last solve, for residuals that have longer tails than noise; false where it changes
+  /// nothing.
+  bool loosen_more(double most, double most_px);
   bool loosened() const { return jitter_px_ > 0 || noise_scale_ > 1; }
 
   std::vector<Sector>& sectors() { return sectors_; }

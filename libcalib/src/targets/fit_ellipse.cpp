@@ -122,18 +122,24 @@ bool fit_band(ContourFit& pixels, ContourModel& model, double noise, Effort effo
     const double scale = std::max({kRobustSigma * std::clamp(pixels.robust_scale(), 1.0, 10.0), share * step});
     if (!pixels.solve(model, 10, 1e-3, scale)) return false;
   }
+  const double most_noise = kMostNoise * std::abs(model.p[ContourModel::step]) / noise;
   if (effort == Effort::noisier) {
-    pixels.loosen(kMostNoise * std::abs(model.p[ContourModel::step]) / noise, kMostJitter);
+    pixels.loosen(most_noise, kMostJitter);
     pixels.weigh();
   }
-  for (int i = 0; i < 6; ++i) {
-    pixels.measure_sectors(tolerance());
-    if (!judge_sectors(pixels.sectors()) && i > 0) return true;
+  for (int pass = 0;; ++pass) {
+    bool settled = false;
+    for (int i = 0; i < 6 && !settled; ++i) {
+      pixels.measure_sectors(tolerance());
+      settled = !judge_sectors(pixels.sectors()) && i > 0;
+      if (settled) break;
+      pixels.weigh();
+      if (pixels.pixels() < 2 * ContourModel::kSize) return false;
+      if (!pixels.solve(model, 10, converged, 0)) return false;
+    }
+    if (effort != Effort::noisier || pass > 0 || !pixels.loosen_more(most_noise, kMostJitter)) return true;
     pixels.weigh();
-    if (pixels.pixels() < 2 * ContourModel::kSize) return false;
-    if (!pixels.solve(model, 10, converged, 0)) return false;
   }
-  return true;
 }
 
 /// From a start to an answer.
