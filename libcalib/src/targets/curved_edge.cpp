@@ -41,7 +41,7 @@ void CurvedEdge::find(const BlurredEllipse::Pixels& pixels, Foot& foot) const {
   const Lanes vx = all(i11_) * x + all(i12_) * y, vy = all(i12_) * x + all(i22_) * y;
   const Lanes scale = inverse_root(vx * vx + vy * vy + all(1e-12f));
   foot.x = vx * scale, foot.y = vy * scale;
-  for (int i = 0; i < 4; ++i) approach(x, y, foot);
+  for (int i = 0; i < 3; ++i) approach(x, y, foot);
 }
 
 void CurvedEdge::add(const BlurredEllipse::Pixels& pixels, Foot& foot, BlurredEllipse::Share& share) const {

@@ -186,10 +186,11 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
   const BandWidth band{std::min(reach, options.inner_ratio > 0 ? 0.6 * wall : wall), reach, kHighestRatio};
 
   std::vector<BandPixel> pixels;
-  pixels.reserve(std::size_t(8 * guess.a * (band.inward + band.outward)) + 64);
+  if (with_covariance) pixels.reserve(std::size_t(8 * guess.a * (band.inward + band.outward)) + 64);
   // Levels are those of the band's outer parts; of a thin ring these may hold no pixel's centre, then all of a side.
   double inside = 0, outside = 0, any_inside = 0, energy = 0;
   int n_inside = 0, n_outside = 0, n_any_inside = 0, clipped = 0;
+  std::size_t count = 0;
   Matrix5 normal = Matrix5::Zero();
   Vector5 right = Vector5::Zero();
   for_each_in_band(guess, frame, band, box, [&](const BandPixels& some) {
@@ -213,11 +214,12 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
         for (int m = n; m < 5; ++m) normal(m, n) += k[m] * k[n];
       right -= k * (c * c);
       energy += p.gradient.squaredNorm();
-      pixels.push_back(p);
+      ++count;
+      if (with_covariance) pixels.push_back(p);
     }
   });
   if (n_inside == 0) inside = any_inside, n_inside = n_any_inside;
-  if (pixels.size() < 12 || n_inside == 0 || n_outside == 0) return fit;
+  if (count < 12 || n_inside == 0 || n_outside == 0) return fit;
   fit.inside = inside / n_inside;
   fit.outside = outside / n_outside;
   const double contrast = fit.outside - fit.inside, middle = 0.5 * (fit.outside + fit.inside);
@@ -226,7 +228,7 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
     fit.state = EllipseState::no_contrast;
     return fit;
   }
-  if (clipped > options.max_saturated * double(pixels.size())) {
+  if (clipped > options.max_saturated * double(count)) {
     fit.state = EllipseState::saturated;
     return fit;
   }
@@ -251,7 +253,7 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
   // An edge with a Gaussian profile of sigma s has ∫ slope² = contrast² / (2 sqrt(pi) s) across it; noise adds its own.
   const double ratio = (fit.ellipse.a - fit.ellipse.b) / (fit.ellipse.a + fit.ellipse.b), h = ratio * ratio;
   const double length = std::numbers::pi * (fit.ellipse.a + fit.ellipse.b) * (1 + 3 * h / (10 + std::sqrt(4 - 3 * h)));
-  energy -= 2 * noise * noise * filters.variance() * double(pixels.size());
+  energy -= 2 * noise * noise * filters.variance() * double(count);
   if (energy > 0) {
     const double s = contrast * contrast * length / (2 * std::sqrt(std::numbers::pi) * energy);
     const double sigma = options.gradient_sigma_px;
