@@ -90,6 +90,7 @@ class ContourFit {
   bool loosened() const { return jitter_px_ > 0 || noise_scale_ > 1; }
 
   std::vector<Sector>& sectors() { return sectors_; }
+  bool quick() const { return quick_; }  ///< whether the expansion serves the pixels that were gathered
   /// Of the last solve: Σ residual² / variance, pixels that counted, inverse of the normal matrix.
   double squares() const { return squares_; }
   int pixels() const { return pixels_; }
