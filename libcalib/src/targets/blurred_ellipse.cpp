@@ -55,7 +55,16 @@ void BlurredEllipse::add_contour(const Eigen::Vector2d& center, const Eigen::Mat
   }
 }
 
-void BlurredEllipse::evaluate(const Pixels& p, Share& share) const {
+void BlurredEllipse::evaluate(const Pixels& pixels, Share& share) const { sum<true>(pixels, share); }
+
+Lanes BlurredEllipse::covered(const Pixels& pixels) const {
+  Share share;
+  sum<false>(pixels, share);
+  return share.w;
+}
+
+template <bool derivatives>
+void BlurredEllipse::sum(const Pixels& p, Share& share) const {
   const float scale = float(1 / s_);
   const Lanes px = p.x * all(scale), py = p.y * all(scale);
   // What a group must reach to have a part: across u within the Gaussian, along u not behind the pixels.
@@ -93,20 +102,22 @@ void BlurredEllipse::evaluate(const Pixels& p, Share& share) const {
         w += ey * normal_cdf(all(direction) * x, ex) * all(direction * n->nx);
       else
         w += ex * normal_cdf(all(direction) * y, ey) * all(direction * n->ny);
+      const Lanes nxx = all(n->nx) * x, nyy = all(n->ny) * y;
+      fourth += e * (nxx * (xx - all(3)) + nyy * (yy - all(3)));
+      if constexpr (!derivatives) continue;
       cx += e * all(n->nx);
       cy += e * all(n->ny);
       r0 += e * all(n->root[0]);
       r1 += e * all(n->root[1]);
       r2 += e * all(n->root[2]);
-      const Lanes nxx = all(n->nx) * x, nyy = all(n->ny) * y;
       by_s += e * (nxx + nyy);
-      fourth += e * (nxx * (xx - all(3)) + nyy * (yy - all(3)));
       if (ring_) ratio += e * all(n->ratio);
     }
   }
   const double flux = 1 / std::sqrt(2 * std::numbers::pi), density = 1 / (2 * std::numbers::pi);
   const double s2 = s_ * s_;
   share.w = all(float(flux)) * w + all(float(density / (2880 * s2 * s2))) * fourth;
+  if constexpr (!derivatives) return;
   const Lanes by_n = all(float(density / s_)), by_weight = all(float(density / s2));
   share.by_center[0] = by_n * cx;
   share.by_center[1] = by_n * cy;

@@ -17,6 +17,7 @@ using Eigen::Vector2d;
 
 constexpr int kMostNeighbours = 12;
 constexpr int kLargestLattice = 200;  // places along a side
+constexpr double kFilled = 0.75;      // of a lattice's box
 
 struct Neighbour {
   int blob;
@@ -82,38 +83,40 @@ class Grower {
 
   std::vector<CircleLattice> run(int least) {
     std::vector<CircleLattice> found;
-    for (int i = 0; i < int(blobs_.size()); ++i) {
-      if (used_[std::size_t(i)]) continue;
-      const std::vector<Neighbour> around = neighbours(i);
-      CircleLattice best;
-      std::size_t best_count = 0;
-      int tries = 0;
-      for (const Neighbour& u : around) {
-        for (const Neighbour& v : around) {
-          if (tries >= 6 || best_count > 0) break;
-          const double cross = u.normal.x() * v.normal.y() - u.normal.y() * v.normal.x();
-          const double product = u.normal.norm() * v.normal.norm();
-          if (cross < 0.8 * product) continue;  // 37° off a right angle at most
-          const Vector2d corner = center(u.blob) + center(v.blob) - center(i);
-          const int w = nearest(corner, i, 0.3 * pitch_);
-          if (w < 0 || w == u.blob || w == v.blob) continue;
-          ++tries;
-          std::vector<int> members;
-          CircleLattice lattice = grow(i, u.blob, v.blob, w, members);
-          if (std::min(lattice.columns, lattice.rows) < least || members.size() <= best_count) continue;
-          best = std::move(lattice);
-          best_count = members.size();
-        }
-      }
-      if (best_count == 0) continue;
-      for (const int b : best.blob)
-        if (b >= 0) used_[std::size_t(b)] = true;
-      found.push_back(std::move(best));
-    }
+    // Spots look larger than they are where circles are small, and a diagonal may pass for a step: a lattice of every
+    // other place. Those that fill their box come first; what is left may have holes.
+    for (const double filled : {kFilled, 0.0})
+      for (int i = 0; i < int(blobs_.size()); ++i)
+        if (!used_[std::size_t(i)]) from(i, least, filled, found);
     return found;
   }
 
  private:
+  // The lattice about a spot of which at least such a part is there.
+  void from(int i, int least, double filled, std::vector<CircleLattice>& found) {
+    const std::vector<Neighbour> around = neighbours(i);
+    int tries = 0;
+    for (const Neighbour& u : around)
+      for (const Neighbour& v : around) {
+        if (tries >= 6) return;
+        const double cross = u.normal.x() * v.normal.y() - u.normal.y() * v.normal.x();
+        const double product = u.normal.norm() * v.normal.norm();
+        if (cross < 0.8 * product) continue;  // 37° off a right angle at most
+        const Vector2d corner = center(u.blob) + center(v.blob) - center(i);
+        const int w = nearest(corner, i, 0.3 * pitch_);
+        if (w < 0 || w == u.blob || w == v.blob) continue;
+        ++tries;
+        std::vector<int> members;
+        CircleLattice lattice = grow(i, u.blob, v.blob, w, members);
+        if (std::min(lattice.columns, lattice.rows) < least ||
+            double(members.size()) < filled * double(lattice.blob.size()))
+          continue;
+        for (const int b : members) used_[std::size_t(b)] = true;
+        found.push_back(std::move(lattice));
+        return;
+      }
+  }
+
   const Vector2d& center(int i) const { return blobs_[std::size_t(i)].center; }
 
   // Whether two spots can be pictures of equal circles that stand side by side.

@@ -84,8 +84,17 @@ struct Contours {
   int good = 0;
 };
 
-// Measures the circles whose state is good.
-Contours measure(const LightPlane& plane, std::span<const Ellipse> circles, std::span<const EllipseState> states,
+// Whether a contour can be the one that was meant.
+bool can_be(const EllipseFit& fit, const Ellipse& guess) {
+  const Ellipse& e = fit.ellipse;
+  return (e.center - guess.center).norm() <= 0.3 * guess.b + 0.7 && e.a * e.b <= 2 * guess.a * guess.b &&
+         2.5 * e.a * e.b >= guess.a * guess.b;
+}
+
+// Measures the circles whose state is good; predicted: where the others say that they are. A spot may be larger than
+// its circle, where the threshold is close to the paper.
+Contours measure(const LightPlane& plane, std::span<const Ellipse> circles,
+                 std::span<const std::optional<Ellipse>> predicted, std::span<const EllipseState> states,
                  const CellReading& first, const CircleLook& look, const DetectOptions& options) {
   Contours contours;
   contours.fits.resize(circles.size());
@@ -97,10 +106,8 @@ Contours measure(const LightPlane& plane, std::span<const Ellipse> circles, std:
     EllipseFit& fit = contours.fits[i];
     fit = options.refine ? fit_ellipse(plane, guess, fit_options) : dual_conic_fit(plane, guess, fit_options);
     if (fit.state != EllipseState::good) continue;
-    const Ellipse& e = fit.ellipse;
-    // A contour that is not the one that was meant.
-    if ((e.center - guess.center).norm() > 0.3 * guess.b + 0.7 || e.a * e.b > 2 * guess.a * guess.b ||
-        2.5 * e.a * e.b < guess.a * guess.b || fit.outside <= fit.inside) {
+    const bool meant = can_be(fit, guess) || (predicted[i] && can_be(fit, *predicted[i]));
+    if (!meant || fit.outside <= fit.inside) {
       fit.state = EllipseState::no_fit;
       continue;
     }
@@ -223,6 +230,7 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   const std::size_t n = window.blob.size();
   const double radius = design.circle_radius_m();
   const std::vector<Vector2d> points = plane_points(grid, design.size_m);
+  const bool checked = design.family.name() != "paper4x4";
   WindowResult result;
 
   std::vector<Vector2d> from, to;
@@ -266,20 +274,21 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
 
   // Measure; a first reading says which circles are rings.
   std::vector<Ellipse> circles(n);
+  std::vector<std::optional<Ellipse>> predicted(n);
   std::vector<EllipseState> states(n, EllipseState::no_fit);
   for (std::size_t i = 0; i < n; ++i) {
-    const std::optional<Ellipse> predicted = seen_circle(h, points[i], radius);
+    predicted[i] = seen_circle(h, points[i], radius);
     if (window.blob[i] >= 0)
       circles[i] = ellipse_of(blobs[std::size_t(window.blob[i])]);
-    else if (predicted)
-      circles[i] = *predicted;
+    else if (predicted[i])
+      circles[i] = *predicted[i];
     else
       continue;
     states[i] = EllipseState::good;
   }
   const CircleLook look = look_of(design);
   const CellReading first = read_cells(plane, circles, states, grid, 2 * grid - 1, look);
-  const Contours contours = measure(plane, circles, states, first, look, options);
+  const Contours contours = measure(plane, circles, predicted, states, first, look, options);
   const std::vector<EllipseFit>& fits = contours.fits;
   const int good = contours.good;
   std::vector<EllipseState> readable(n);
@@ -353,8 +362,25 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   }
   std::sort(features.begin(), features.end(), [](const Feature& a, const Feature& b) { return a.index < b.index; });
 
+  // Without check bits a circle that was read and not measured has to be a whole one where it belongs: a thing that
+  // covers a part of it would be read instead.
+  const auto all_in_place = [&](const Matrix3d& pixel_from_plane, const std::vector<Feature>& measured) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const int index = upright(i);
+      if (std::any_of(measured.begin(), measured.end(), [&](const Feature& f) { return f.index == index; })) continue;
+      const std::optional<Ellipse> expected =
+          seen_circle(pixel_from_plane, printed.feature(index), printed.circle_radius_m());
+      if (!expected || window.blob[i] < 0) return false;
+      const Ellipse seen = ellipse_of(blobs[std::size_t(window.blob[i])]);
+      const auto about = [](double axis, double other) { return std::abs(axis - other) < 0.15 * other + 0.6; };
+      if (!((seen.center - expected->center).norm() < 0.1 * expected->b + 0.3) || !about(seen.a, expected->a) ||
+          !about(seen.b, expected->b))
+        return false;
+    }
+    return true;
+  };
+
   // Features that don't keep to the plane by far (a disturbed contour) go; what is smooth, distortion, stays.
-  const bool checked = design.family.name() != "paper4x4";
   for (int round = 0; round < 3; ++round) {
     from.clear(), to.clear();
     for (const Feature& f : features) {
@@ -380,7 +406,8 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   }
   // Smooth distortion leaves an error that grows with the target; without check bits there is less to give away.
   if (!(target.rms_px < (checked ? 0.035 : 0.02) * pitch_px + 0.1)) return refuse(RefusedTarget::Reason::homography);
-  if (!checked && features.size() < n) return refuse(too_few);
+  if (!checked && !(features.size() * 4 >= 3 * n && all_in_place(h, features)))
+    return refuse(RefusedTarget::Reason::too_few_features);
   if (!checked && reading.dark_spread > 0.15) return refuse(RefusedTarget::Reason::no_code);
   target.pixel_from_target = h / h.norm();
   target.features = std::move(features);

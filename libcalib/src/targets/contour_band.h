@@ -6,6 +6,9 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "lanes.h"
 
 namespace lumihull::calib {
 
@@ -31,12 +34,6 @@ struct UnitFrame {
     root = symmetric(e.a, e.b);
     inverse = symmetric(1 / e.a, 1 / e.b);
   }
-
-  /// Signed distance from the contour, px, positive outside: right to second order near it.
-  double distance(const Eigen::Vector2d& v) const {
-    const double rho = v.norm();
-    return rho > 0 ? (rho - 1) * rho / (inverse * v).norm() : -1 / inverse.norm();
-  }
 };
 
 /// A picture's pixels from (x0, y0) to before (x1, y1).
@@ -57,11 +54,24 @@ inline bool contains(const PixelBox& box, const Ellipse& e, double margin) {
          e.center.y() - half.y() - margin >= box.y0 && e.center.y() + half.y() + margin <= box.y1;
 }
 
-/// Calls body(x, y, v, distance) for the pixels of `box` in the band, row by row; v: in the unit frame. Takes time in
+/// Up to eight pixels of a row, from x on, and which of them are in the band.
+struct BandPixels {
+  int x = 0, y = 0;
+  IntLanes inside;  ///< of the band: -1, else 0
+  Lanes distance;   ///< signed, from the contour, px, positive outside: right to second order near it
+  Lanes gx, gy;     ///< the contour's outward normal, not of length 1
+};
+
+/// Calls body(BandPixels) for the pixels of `box` in the band, row by row, where there are any. Takes time in
 /// proportion to the contour's length.
 template <class Body>
 void for_each_in_band(const Ellipse& e, const UnitFrame& frame, const BandWidth& band, const PixelBox& box,
                       Body&& body) {
+  const auto lanes_of = [](double v) { return all(float(v)); };
+  const Lanes v11 = lanes_of(frame.inverse(0, 0)), v12 = lanes_of(frame.inverse(0, 1)),
+              v22 = lanes_of(frame.inverse(1, 1)), inward = lanes_of(-band.inward), outward = lanes_of(band.outward),
+              highest2 = lanes_of(std::min(1e12, band.highest_ratio * band.highest_ratio));
+  const Lanes ramp{0, 1, 2, 3, 4, 5, 6, 7};
   // An ellipse that surely holds the band, and one that surely holds none of it.
   Ellipse outer = e;
   outer.a += 1.3 * band.outward + 1;
@@ -92,14 +102,27 @@ void for_each_in_band(const Ellipse& e, const UnitFrame& frame, const BandWidth&
       hole_begin = std::max(begin, clamped(std::ceil(e.center.x() + middle - half)));
       hole_end = std::max(hole_begin, clamped(std::floor(e.center.x() + middle + half)));
     }
-    for (int x = begin; x < end; ++x) {
-      if (x == hole_begin) x = hole_end;
-      if (x >= end) break;
-      const Eigen::Vector2d v = frame.inverse * Eigen::Vector2d(x + 0.5 - e.center.x(), dy);
-      const double d = frame.distance(v);
-      if (d >= -band.inward && d <= band.outward && v.squaredNorm() <= band.highest_ratio * band.highest_ratio)
-        body(x, y, v, d);
-    }
+    const Lanes row = lanes_of(dy);
+    for (const auto& [first, last] : {std::pair{begin, hole_begin}, {hole_end, end}})
+      for (int x = first; x < last; x += kLanes) {
+        const Lanes dx = lanes_of(x + 0.5 - e.center.x()) + ramp;
+        const Lanes vx = v11 * dx + v12 * row, vy = v12 * dx + v22 * row;
+        BandPixels pixels;
+        pixels.x = x, pixels.y = y;
+        pixels.gx = v11 * vx + v12 * vy, pixels.gy = v12 * vx + v22 * vy;
+        const Lanes rho2 = vx * vx + vy * vy + all(1e-12f), steep2 = pixels.gx * pixels.gx + pixels.gy * pixels.gy;
+        // (rho - 1) / |d rho / d p|; in the very centre that has no direction, and is some axis.
+        const Lanes rho = rho2 * inverse_root(rho2);
+        pixels.distance =
+            chosen(rho2 < all(1e-8f), lanes_of(-e.b), (rho - all(1)) * rho * inverse_root(steep2 + all(1e-30f)));
+        pixels.inside = (pixels.distance >= inward) & (pixels.distance <= outward) & (rho2 <= highest2);
+        bool any = false;
+        for (int i = 0; i < kLanes; ++i) {
+          if (x + i >= last) pixels.inside[i] = 0;
+          any |= pixels.inside[i] != 0;
+        }
+        if (any) body(pixels);
+      }
   }
 }
 

@@ -18,18 +18,48 @@ constexpr double kRatioSd = 0.03;    // of a ring's ratio, a priori: ink spreads
 constexpr double kLeastRaise = 1.2;  // of the noise: less may be chance
 constexpr float kOnSlope = 0.25f;    // of the steepest slope
 constexpr int kFlush = 32;           // blocks that are summed in float
+// Times s, what CurvedEdge is used for: the pixels see not much beyond the centres of curvature.
+constexpr double kMostCurvature = 0.32, kMostInnerCurvature = 0.45;
+constexpr double kFastestRate = 0.02;    // of convergence that is believed: what is ill determined comes late
+constexpr double kMildCurvature = 0.25;  // times s: a rough fit needs no correction
+constexpr double kFlat = 4.5;            // s from the contour: no edge is seen, with some to spare
+// What a corrected share may be off by, in px of the contour: the correction changes by about κ³ s³ of the model's
+// movement.
+constexpr double kCorrected = 5e-5;
 
 }  // namespace
 
-void ContourFit::gather(const Ellipse& ellipse, const BandWidth& band, int sectors) {
+void ContourFit::gather(const Ellipse& ellipse, const ContourModel& model, const BandWidth& band, int sectors,
+                        double inner_ratio) {
   blocks_.clear();
   sectors_.assign(std::size_t(sectors), {});
   gathered_ = 0;
-  std::array<Block, BlurredEllipse::kSides> open{};
+  inner_ratio_ = inner_ratio;
+  const double s = model.p[ContourModel::blur], ratio = inner_ratio > 0 ? model.p[ContourModel::ratio] : 1;
+  const double outer_curvature = s * ellipse.a / (ellipse.b * ellipse.b);
+  curvature_ = outer_curvature / ratio;
+  quick_ = sum_ == ContourSum::quick && outer_curvature < kMostCurvature && curvature_ < kMostInnerCurvature;
+  corrected_at_.p.setConstant(1e9);
+  const float flat = quick_ ? float(kFlat * s) : 1e9f, flat_outside = flat, flat_inside = inner_ratio > 0 ? 1e9f : flat;
+
+  constexpr std::size_t outside_flat = BlurredEllipse::kSides, inside_flat = outside_flat + 1;
+  std::array<Block, inside_flat + 1> open{};  // edges by side, then levels
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    open[i].part = i < outside_flat ? Part::edge : i == outside_flat ? Part::outside : Part::inside;
+    open[i].pixels.side = i < outside_flat ? BlurredEllipse::Side(i) : BlurredEllipse::right;
+  }
   const UnitFrame frame(ellipse);
-  const double per_radian = sectors / (2 * std::numbers::pi);
+  const Lanes per_radian = all(float(sectors / (2 * std::numbers::pi)));
+  const auto lanes_of = [](double v) { return all(float(v)); };
+  const Lanes v11 = lanes_of(frame.inverse(0, 0)), v12 = lanes_of(frame.inverse(0, 1)),
+              v22 = lanes_of(frame.inverse(1, 1)), middle_x = lanes_of(ellipse.center.x() - origin_.x()),
+              middle_y = lanes_of(ellipse.center.y() - origin_.y());
   const auto close = [&](Block& block) {
     BlurredEllipse::Pixels& p = block.pixels;
+    const Lanes x = p.x - middle_x, y = p.y - middle_y;
+    const Lanes turn = (angle_of(v12 * x + v22 * y, v11 * x + v12 * y) + all(float(std::numbers::pi))) * per_radian;
+    for (int i = 0; i < block.count; ++i)
+      block.sector[std::size_t(i)] = std::uint8_t(std::clamp(int(turn[i]), 0, sectors - 1));
     for (int i = block.count; i < kLanes; ++i) p.x[i] = p.x[0], p.y[i] = p.y[0];
     p.low_x = p.high_x = p.x[0];
     p.low_y = p.high_y = p.y[0];
@@ -41,31 +71,74 @@ void ContourFit::gather(const Ellipse& ellipse, const BandWidth& band, int secto
     block.count = 0;
   };
   const PixelBox box{0, 0, plane_.values.width(), plane_.values.height()};
-  for_each_in_band(ellipse, frame, band, box, [&](int x, int y, const Eigen::Vector2d& v, double) {
-    const float value = plane_.values.row<float>(y)[x];
-    if (!std::isfinite(value)) return;
-    const Eigen::Vector2d normal = frame.inverse * v;
-    const auto side = std::abs(normal.x()) >= std::abs(normal.y())
-                          ? (normal.x() > 0 ? BlurredEllipse::right : BlurredEllipse::left)
-                          : (normal.y() > 0 ? BlurredEllipse::bottom : BlurredEllipse::top);
-    Block& block = open[std::size_t(side)];
-    if (block.count == 0) block = Block{}, block.pixels.side = side;
-    const int lane = block.count++;
-    block.pixels.x[lane] = float(x + 0.5 - origin_.x());
-    block.pixels.y[lane] = float(y + 0.5 - origin_.y());
-    block.value[lane] = value;
-    const double angle = std::atan2(v.y(), v.x()) + std::numbers::pi;
-    block.sector[std::size_t(lane)] = std::uint8_t(std::min(sectors - 1, int(angle * per_radian)));
-    ++gathered_;
-    if (block.count == kLanes) close(block);
+  for_each_in_band(ellipse, frame, band, box, [&](const BandPixels& p) {
+    const float* values = plane_.values.row<float>(p.y) + p.x;
+    for (int i = 0; i < kLanes; ++i) {
+      if (!p.inside[i] || !std::isfinite(values[i])) continue;
+      const float gx = p.gx[i], gy = p.gy[i], distance = p.distance[i];
+      std::size_t kind = distance > flat_outside ? outside_flat : inside_flat;
+      if (distance >= -flat_inside && distance <= flat_outside)
+        kind = std::abs(gx) >= std::abs(gy) ? (gx > 0 ? BlurredEllipse::right : BlurredEllipse::left)
+                                            : (gy > 0 ? BlurredEllipse::bottom : BlurredEllipse::top);
+      Block& block = open[kind];
+      const int lane = block.count++;
+      block.pixels.x[lane] = float(p.x + i + 0.5 - origin_.x());
+      block.pixels.y[lane] = float(p.y + 0.5 - origin_.y());
+      block.value[lane] = values[i];
+      ++gathered_;
+      if (block.count == kLanes) close(block);
+    }
   });
   for (Block& block : open)
     if (block.count > 0) close(block);
+  if (!quick_) return;
+  set(model);
+  for (Block& block : blocks_) {
+    block.correction = all(0);
+    if (block.part != Part::edge) continue;
+    outer_.find(block.pixels, block.foot);
+    if (inner_ratio_ > 0) inner_.find(block.pixels, block.inner_foot);
+  }
+}
+
+void ContourFit::set(const ContourModel& model) {
+  const double s = model.p[ContourModel::blur], ratio = model.p[ContourModel::ratio];
+  if (!quick_) {
+    exact_.set(model.center(), model.root(), s, inner_ratio_ > 0 ? ratio : 0);
+    return;
+  }
+  outer_.set(model.center(), model.root(), s, 1, false);
+  if (inner_ratio_ > 0) inner_.set(model.center(), model.root(), s, ratio, true);
+}
+
+void ContourFit::look(Block& block, BlurredEllipse::Share& share) const {
+  share = BlurredEllipse::Share{};
+  outer_.add(block.pixels, block.foot, share);
+  if (inner_ratio_ > 0) inner_.add(block.pixels, block.inner_foot, share);
+}
+
+bool ContourFit::corrected(const ContourModel& model) const {
+  const double moved = (model.p - corrected_at_.p).head<ContourModel::blur + 1>().norm();
+  if (!near_ && curvature_ < kMildCurvature) return true;
+  return !quick_ || moved * curvature_ * curvature_ * curvature_ < kCorrected;
+}
+
+void ContourFit::correct(const ContourModel& model) {
+  set(model);
+  exact_.set(model.center(), model.root(), model.p[ContourModel::blur],
+             inner_ratio_ > 0 ? model.p[ContourModel::ratio] : 0);
+  BlurredEllipse::Share share;
+  for (Block& block : blocks_) {
+    if (block.part != Part::edge) continue;
+    look(block, share);
+    block.correction = exact_.covered(block.pixels) - share.w;
+  }
+  corrected_at_ = model;
 }
 
 template <class Body>
 void ContourFit::for_each_residual(const ContourModel& model, Body&& body) {
-  share_.set(model.center(), model.root(), model.p[ContourModel::blur], ring_ ? model.p[ContourModel::ratio] : 0);
+  set(model);
   BlurredEllipse::Share share;
   const Lanes gx = all(float(model.p[ContourModel::light_x] / unit_)),
               gy = all(float(model.p[ContourModel::light_y] / unit_));
@@ -73,18 +146,33 @@ void ContourFit::for_each_residual(const ContourModel& model, Body&& body) {
   const Lanes spread = all(float(model.p[ContourModel::blur] * model.p[ContourModel::blur]));
   const Lanes outside = all(float(model.p[ContourModel::outside])), step = all(float(model.p[ContourModel::step]));
   for (Block& block : blocks_) {
-    share_.evaluate(block.pixels, share);
     const Lanes light = all(1) + gx * block.pixels.x + gy * block.pixels.y;
+    if (block.part != Part::edge) {
+      share = BlurredEllipse::Share{};
+      share.w = all(block.part == Part::inside ? 1.0f : 0.0f);
+      const Lanes plain = outside + step * share.w;
+      block.expected = plain * light;
+      block.slope = all(0);
+      body(block, share, light, plain, block.value - block.expected);
+      continue;
+    }
+    if (quick_) {
+      look(block, share);
+      share.w += block.correction;
+    } else {
+      exact_.evaluate(block.pixels, share);
+    }
     const Lanes plain = outside + step * share.w;
     block.expected = plain * light - step * spread * (gx * share.by_center[0] + gy * share.by_center[1]);
     const Lanes slope2 = share.by_center[0] * share.by_center[0] + share.by_center[1] * share.by_center[1];
-    for (int i = 0; i < kLanes; ++i) block.slope[i] = step[i] * std::sqrt(slope2[i]);
+    block.slope = step * slope2 * inverse_root(slope2 + all(1e-30f));
     body(block, share, light, plain, block.value - block.expected);
   }
 }
 
-void ContourFit::expect(const ContourModel& model, double inner_ratio) {
-  ring_ = inner_ratio > 0;
+void ContourFit::expect(const ContourModel& model, bool near) {
+  near_ = near;
+  if (near && !corrected(model)) correct(model);
   for_each_residual(model, [](const Block&, const BlurredEllipse::Share&, const Lanes&, const Lanes&, const Lanes&) {});
 }
 
@@ -115,7 +203,7 @@ double ContourFit::evaluate(const ContourModel& model, double robust, ContourMod
   ContourModel::Matrix h = ContourModel::Matrix::Zero();
   ContourModel::Vector b = ContourModel::Vector::Zero();
   double squares = 0;
-  const int size = ring_ ? kSize : kSize - 1;
+  const int size = inner_ratio_ > 0 ? kSize : kSize - 1;
   const auto flush = [&] {
     std::size_t k = 0;
     const auto total = [&](std::size_t i) {
@@ -138,6 +226,19 @@ double ContourFit::evaluate(const ContourModel& model, double robust, ContourMod
     const Lanes scaled = residual * residual * block.weight, damping = all(1) / (all(1) + limit * scaled);
     sums[kPairs + kSize] += scaled * damping;
     const Lanes weight = block.weight * damping * damping, by_share = step * light;
+    if (block.part != Part::edge) {  // shows the levels and the light alone
+      constexpr int first = ContourModel::outside, last = ContourModel::light_y;
+      static_assert(last - first == 3);
+      const Lanes seen[4] = {light, light * share.w, plain * block.pixels.x * per_unit,
+                             plain * block.pixels.y * per_unit};
+      for (int i = first; i <= last; ++i) {
+        const Lanes weighted = weight * seen[i - first];
+        for (int j = first; j <= i; ++j) sums[std::size_t(i * (i + 1) / 2 + j)] += weighted * seen[j - first];
+        sums[std::size_t(kPairs + i)] += weighted * residual;
+      }
+      if (++since == kFlush) flush(), since = 0;
+      return;
+    }
     const Lanes slope[kSize] = {by_share * share.by_center[0],
                                 by_share * share.by_center[1],
                                 by_share * share.by_root[0],
@@ -163,10 +264,19 @@ double ContourFit::evaluate(const ContourModel& model, double robust, ContourMod
   return squares;
 }
 
-bool ContourFit::solve(ContourModel& model, int max_iterations, double converged, double robust, double inner_ratio) {
+bool ContourFit::solve(ContourModel& model, int max_iterations, double converged, double robust) {
+  double rate = 1;
+  for (int i = 0; i < 5; ++i) {
+    if (!iterate(model, max_iterations, converged, robust, rate)) return false;
+    if (corrected(model)) break;
+    correct(model);
+  }
+  return true;
+}
+
+bool ContourFit::iterate(ContourModel& model, int max_iterations, double converged, double robust, double& rate) {
   using Vector = ContourModel::Vector;
   using Matrix = ContourModel::Matrix;
-  ring_ = inner_ratio > 0;
   const double least_blur = 0.3, most_blur = std::min(std::max(0.85 * unit_, 1.0), std::max(2.6, 0.3 * unit_));
   const double size = model.root().determinant();
   const auto with_prior = [&](const ContourModel& m, double squares, Matrix* h, Vector* b) {
@@ -178,14 +288,15 @@ bool ContourFit::solve(ContourModel& model, int max_iterations, double converged
     }
     squares += std::log(spread / expected);
     constexpr int kRatio = ContourModel::ratio;
-    const double weight = ring_ ? 1 / (kRatioSd * kRatioSd) : 1, off = ring_ ? m.p[kRatio] - inner_ratio : 0;
+    const double weight = inner_ratio_ > 0 ? 1 / (kRatioSd * kRatioSd) : 1,
+                 off = inner_ratio_ > 0 ? m.p[kRatio] - inner_ratio_ : 0;
     if (h) (*h)(kRatio, kRatio) += weight, (*b)[kRatio] -= weight * off;
     squares += weight * off * off;
     return squares;
   };
   Matrix h;
   Vector b;
-  double squares = evaluate(model, robust, &h, &b), lambda = 1e-3;
+  double squares = evaluate(model, robust, &h, &b), lambda = 1e-3, before = 0;
   double loss = with_prior(model, squares, &h, &b);
   bool current = true;  // what is expected is the model's
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
@@ -217,7 +328,10 @@ bool ContourFit::solve(ContourModel& model, int max_iterations, double converged
         h = next_h;
         b = next_b;
         lambda = std::max(1e-7, lambda * 0.1);
-        if (moved < converged) break;
+        // What the next step would be, where each is that much shorter than the one before.
+        if (before > 0) rate = std::clamp(moved / before, kFastestRate, 1.0);
+        before = moved;
+        if (moved * rate < converged) break;
         continue;
       }
     }
@@ -225,7 +339,7 @@ bool ContourFit::solve(ContourModel& model, int max_iterations, double converged
     lambda *= 10;
     if (lambda > 1e6) break;
   }
-  if (!current) expect(model, inner_ratio);
+  if (!current) expect(model, false);
   squares_ = squares;
   information_ = h;
   return std::isfinite(squares);
@@ -282,6 +396,15 @@ void ContourFit::loosen(double most, double most_px) {
   noise *= noise_scale_ * noise_scale_ / double(scratch_.size());
   const double seen = median_scale();
   if (seen * seen > kLeastRaise * kLeastRaise * noise) jitter_px_ = std::min(std::sqrt(seen * seen - noise), most_px);
+}
+
+bool ContourFit::loosen_more(double most, double most_px) {
+  const double raise = std::sqrt(squares_ / std::max(1, pixels_ - kSize));
+  const double noise = std::max(noise_scale_, std::min(noise_scale_ * raise, most));
+  const double jitter = std::max(jitter_px_, std::min(jitter_px_ * raise, most_px));
+  if (!(raise > kLeastRaise) || (noise == noise_scale_ && jitter == jitter_px_)) return false;
+  noise_scale_ = noise, jitter_px_ = jitter;
+  return true;
 }
 
 double ContourFit::robust_scale() {

@@ -10,6 +10,7 @@
 
 #include "blurred_ellipse.h"
 #include "contour_band.h"
+#include "curved_edge.h"
 
 namespace lumihull::calib {
 
@@ -30,7 +31,18 @@ struct ContourModel {
   }
 };
 
+/// How a model's values are summed.
+enum class ContourSum : std::uint8_t {
+  exact,  ///< along the whole contour, always
+  quick,  ///< about the nearest point where the curvature allows, and as far off as it is from the exact sum
+};
+
 /// Pixels of a band in blocks of eight that lie on one side of the ellipse, and the fit to them.
+///
+/// With ContourSum::quick a fit iterates on CurvedEdge's share plus, pixel by pixel, what the exact sum differed by at
+/// a model nearby. It ends where the model has moved so little since that the difference can't have changed by what
+/// matters: the answer is the exact sum's (a defect correction, Stetter 1978), only the derivatives are CurvedEdge's.
+/// Pixels beyond the Gaussian's reach show a plain level.
 class ContourFit {
  public:
   static constexpr int kMaxSectors = 64;
@@ -43,21 +55,23 @@ class ContourFit {
     bool used = true;
   };
 
-  explicit ContourFit(const LightPlane& plane, const Eigen::Vector2d& origin, double unit)
-      : plane_(plane), origin_(origin), unit_(unit) {}
+  ContourFit(const LightPlane& plane, const Eigen::Vector2d& origin, double unit, ContourSum sum)
+      : plane_(plane), origin_(origin), unit_(unit), sum_(sum) {}
 
-  /// Takes the band's pixels; `sectors` parts of the contour, equal in the ellipse's own angle.
-  void gather(const Ellipse& ellipse, const BandWidth& band, int sectors);
+  /// Takes the pixels of the band about a model's contour; `sectors` parts of the contour, equal in the ellipse's own
+  /// angle. inner_ratio: 0, or what is expected of a ring's.
+  void gather(const Ellipse& ellipse, const ContourModel& model, const BandWidth& band, int sectors,
+              double inner_ratio);
   /// What the model expects of each pixel, for weigh, measure_sectors and robust_scale; solve leaves its answer's.
-  void expect(const ContourModel& model, double inner_ratio);
+  /// near: of a quick sum, whether it is corrected here, since the answer is not far.
+  void expect(const ContourModel& model, bool near);
   /// Weights of the pixels by the expected values; clipped ones (by value or by what is expected) and those of sectors
   /// that are not used count nothing.
   void weigh();
 
   /// Levenberg-Marquardt. robust > 0: the Geman-McClure loss r² / (1 + r²), r in units of `robust` standard deviations.
-  /// inner_ratio: 0, or what is expected of a ring's. False where it left its basin.
-  /// converged: squared length of a step, in standard deviations, that ends it.
-  bool solve(ContourModel& model, int max_iterations, double converged, double robust, double inner_ratio);
+  /// False where it left its basin. converged: squared length of a step, in standard deviations, that ends it.
+  bool solve(ContourModel& model, int max_iterations, double converged, double robust);
 
   /// Residuals by sector, pixels of unused sectors included; tolerance: of the values.
   void measure_sectors(double tolerance);
@@ -65,14 +79,18 @@ class ContourFit {
   /// Median of |residual| / standard deviation, over 0.6745.
   double robust_scale();
 
-  /// Takes the pixels for as uncertain as their residuals are, beside the contour and on its slope: noise grows, up to `most`
-  /// times the plane's standard deviation, and weigh() adds (jitter · slope)² to the pixels' variance, up to `most_px`. For
-  /// pictures whose edges are not a blurred step in linear light, whatever their smooth places say of noise: JPEG,
-  /// demosaicing, sharpening, edges mixed in sRGB.
+  /// Takes the pixels for as uncertain as their residuals are, beside the contour and on its slope: noise grows, up to
+  /// `most` times the plane's standard deviation, and weigh() adds (jitter · slope)² to the pixels' variance, up to
+  /// `most_px`. For pictures whose edges are not a blurred step in linear light, whatever their smooth places say of
+  /// noise: JPEG, demosaicing, sharpening, edges mixed in sRGB.
   void loosen(double most, double most_px);
+  /// The same by the RMS of the last solve, for residuals that have longer tails than noise; false where it changes
+  /// nothing.
+  bool loosen_more(double most, double most_px);
   bool loosened() const { return jitter_px_ > 0 || noise_scale_ > 1; }
 
   std::vector<Sector>& sectors() { return sectors_; }
+  bool quick() const { return quick_; }  ///< whether the expansion serves the pixels that were gathered
   /// Of the last solve: Σ residual² / variance, pixels that counted, inverse of the normal matrix.
   double squares() const { return squares_; }
   int pixels() const { return pixels_; }
@@ -81,12 +99,23 @@ class ContourFit {
   const ContourModel::Matrix& information() const { return information_; }
 
  private:
+  enum class Part : std::uint8_t { edge, outside, inside };
   struct Block {
     BlurredEllipse::Pixels pixels;
     Lanes value, weight, variance, expected, slope;  // slope: d expected / d (the contour moves outward by 1 px)
+    CurvedEdge::Foot foot, inner_foot;
+    Lanes correction;  // of the quick share
     std::array<std::uint8_t, kLanes> sector;
     std::uint8_t count = 0;
+    Part part = Part::edge;
   };
+  void set(const ContourModel& model);
+  /// The quick share, uncorrected.
+  void look(Block& block, BlurredEllipse::Share& share) const;
+  /// Makes the quick share the exact one at this model.
+  void correct(const ContourModel& model);
+  bool iterate(ContourModel& model, int max_iterations, double converged, double robust, double& rate);
+  bool corrected(const ContourModel& model) const;
   double evaluate(const ContourModel& model, double robust, ContourModel::Matrix* normal, ContourModel::Vector* right);
   template <class Body>
   void for_each_residual(const ContourModel& model, Body&& body);
@@ -96,8 +125,14 @@ class ContourFit {
   double unit_;
   std::vector<Block> blocks_;
   std::vector<Sector> sectors_;
-  BlurredEllipse share_;
-  bool ring_ = false;
+  ContourSum sum_;
+  BlurredEllipse exact_;
+  CurvedEdge outer_, inner_;
+  bool quick_ = false;  // of the pixels that were gathered
+  bool near_ = false;   // the model is near its answer
+  ContourModel corrected_at_;
+  double curvature_ = 0;    // the largest κ s
+  double inner_ratio_ = 0;  // 0: no ring
   double squares_ = 0, jitter_px_ = 0, noise_scale_ = 1;
   int pixels_ = 0, clipped_ = 0, gathered_ = 0;
   ContourModel::Matrix information_ = ContourModel::Matrix::Zero();

@@ -5,11 +5,13 @@
 #include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 #include <vector>
 
 #include "contour_band.h"
 #include "dual_conic_start.h"
+#include "lanes.h"
 
 namespace lumihull::calib {
 namespace {
@@ -62,6 +64,24 @@ Eigen::Vector2d gradient(const Image& values, const Filters& f, int x, int y) {
     gy += f.slope[std::size_t(j)] * smooth;
   }
   return {gx, gy};
+}
+
+/// Of eight pixels of a row, from x on; all of their neighbourhood is in the picture.
+void gradients(const Image& values, const Filters& f, int x, int y, Lanes& gx, Lanes& gy) {
+  const int taps = 2 * f.radius + 1;
+  gx = gy = all(0);
+  for (int j = 0; j < taps; ++j) {
+    const float* row = values.row<float>(y + j - f.radius) + x - f.radius;
+    Lanes smooth = all(0), slope = all(0);
+    for (int i = 0; i < taps; ++i) {
+      Lanes v;
+      std::memcpy(&v, row + i, sizeof v);
+      smooth += all(float(f.smooth[std::size_t(i)])) * v;
+      slope += all(float(f.slope[std::size_t(i)])) * v;
+    }
+    gx += all(float(f.smooth[std::size_t(j)])) * slope;
+    gy += all(float(f.slope[std::size_t(j)])) * smooth;
+  }
 }
 
 /// A pixel of the band: its place about the guess's centre in units of its scale, and its gradient.
@@ -166,30 +186,40 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
   const BandWidth band{std::min(reach, options.inner_ratio > 0 ? 0.6 * wall : wall), reach, kHighestRatio};
 
   std::vector<BandPixel> pixels;
-  pixels.reserve(std::size_t(8 * guess.a * (band.inward + band.outward)) + 64);
+  if (with_covariance) pixels.reserve(std::size_t(8 * guess.a * (band.inward + band.outward)) + 64);
   // Levels are those of the band's outer parts; of a thin ring these may hold no pixel's centre, then all of a side.
   double inside = 0, outside = 0, any_inside = 0, energy = 0;
   int n_inside = 0, n_outside = 0, n_any_inside = 0, clipped = 0;
+  std::size_t count = 0;
   Matrix5 normal = Matrix5::Zero();
   Vector5 right = Vector5::Zero();
-  for_each_in_band(guess, frame, band, box, [&](int x, int y, const Eigen::Vector2d&, double distance) {
-    const double value = plane.values.row<float>(y)[x];
-    if (value >= double(plane.saturation)) ++clipped;
-    if (distance < -0.5 * band.inward) inside += value, ++n_inside;
-    if (distance < 0) any_inside += value, ++n_any_inside;
-    if (distance > 0.5 * band.outward) outside += value, ++n_outside;
-    BandPixel p{x, y, (Eigen::Vector2d(x + 0.5, y + 0.5) - guess.center) / scale,
-                gradient(plane.values, filters, x, y)};
-    if (!p.gradient.allFinite()) return;
-    double c = 0;
-    const Vector5 k = p.monomials(c);
-    normal.selfadjointView<Eigen::Lower>().rankUpdate(k);
-    right -= k * (c * c);
-    energy += p.gradient.squaredNorm();
-    pixels.push_back(p);
+  for_each_in_band(guess, frame, band, box, [&](const BandPixels& some) {
+    const bool room = some.x + kLanes + filters.radius <= width;
+    Lanes gx, gy;
+    if (room) gradients(plane.values, filters, some.x, some.y, gx, gy);
+    for (int i = 0; i < kLanes; ++i) {
+      if (!some.inside[i]) continue;
+      const int x = some.x + i, y = some.y;
+      const double value = plane.values.row<float>(y)[x], distance = double(some.distance[i]);
+      if (value >= double(plane.saturation)) ++clipped;
+      if (distance < -0.5 * band.inward) inside += value, ++n_inside;
+      if (distance < 0) any_inside += value, ++n_any_inside;
+      if (distance > 0.5 * band.outward) outside += value, ++n_outside;
+      BandPixel p{x, y, (Eigen::Vector2d(x + 0.5, y + 0.5) - guess.center) / scale,
+                  room ? Eigen::Vector2d(double(gx[i]), double(gy[i])) : gradient(plane.values, filters, x, y)};
+      if (!p.gradient.allFinite()) continue;
+      double c = 0;
+      const Vector5 k = p.monomials(c);
+      for (int n = 0; n < 5; ++n)
+        for (int m = n; m < 5; ++m) normal(m, n) += k[m] * k[n];
+      right -= k * (c * c);
+      energy += p.gradient.squaredNorm();
+      ++count;
+      if (with_covariance) pixels.push_back(p);
+    }
   });
   if (n_inside == 0) inside = any_inside, n_inside = n_any_inside;
-  if (pixels.size() < 12 || n_inside == 0 || n_outside == 0) return fit;
+  if (count < 12 || n_inside == 0 || n_outside == 0) return fit;
   fit.inside = inside / n_inside;
   fit.outside = outside / n_outside;
   const double contrast = fit.outside - fit.inside, middle = 0.5 * (fit.outside + fit.inside);
@@ -198,7 +228,7 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
     fit.state = EllipseState::no_contrast;
     return fit;
   }
-  if (clipped > options.max_saturated * double(pixels.size())) {
+  if (clipped > options.max_saturated * double(count)) {
     fit.state = EllipseState::saturated;
     return fit;
   }
@@ -223,7 +253,7 @@ EllipseFit dual_conic_start(const LightPlane& plane, const Ellipse& guess, const
   // An edge with a Gaussian profile of sigma s has ∫ slope² = contrast² / (2 sqrt(pi) s) across it; noise adds its own.
   const double ratio = (fit.ellipse.a - fit.ellipse.b) / (fit.ellipse.a + fit.ellipse.b), h = ratio * ratio;
   const double length = std::numbers::pi * (fit.ellipse.a + fit.ellipse.b) * (1 + 3 * h / (10 + std::sqrt(4 - 3 * h)));
-  energy -= 2 * noise * noise * filters.variance() * double(pixels.size());
+  energy -= 2 * noise * noise * filters.variance() * double(count);
   if (energy > 0) {
     const double s = contrast * contrast * length / (2 * std::sqrt(std::numbers::pi) * energy);
     const double sigma = options.gradient_sigma_px;

@@ -99,19 +99,20 @@ enum class Effort : std::uint8_t {
 
 /// Fits the pixels of one band. Where parts of the contour are disturbed the rest is fitted alone; false: there is no
 /// rest, or no answer.
-bool fit_band(ContourFit& pixels, ContourModel& model, double noise, Effort effort, double converged, double ratio) {
-  pixels.expect(model, ratio);
+bool fit_band(ContourFit& pixels, ContourModel& model, double noise, Effort effort, bool last) {
+  const double converged = last ? 1e-5 : 1e-2;  // squared length of a step, in standard deviations
+  pixels.expect(model, last);
   pixels.weigh();
   const auto tolerance = [&] { return kSectorTolerance * std::abs(model.p[ContourModel::step]); };
   if (effort == Effort::plain) {
     const ContourModel start = model;
-    if (pixels.solve(model, 20, converged, 0, ratio)) {
+    if (pixels.solve(model, 20, converged, 0)) {
       pixels.measure_sectors(tolerance());
       if (!judge_sectors(pixels.sectors())) return true;
     }
     for (ContourFit::Sector& s : pixels.sectors()) s.used = true;
     model = start;
-    pixels.expect(model, ratio);
+    pixels.expect(model, last);
     pixels.weigh();
   }
   // A fit that disturbances do not pull shows where they are: large residuals count ever less.
@@ -119,20 +120,26 @@ bool fit_band(ContourFit& pixels, ContourModel& model, double noise, Effort effo
   for (const double share : {0.3, 0.1, 0.0}) {
     if (share == 0 && effort == Effort::noisier) break;  // that is for noise that is known
     const double scale = std::max({kRobustSigma * std::clamp(pixels.robust_scale(), 1.0, 10.0), share * step});
-    if (!pixels.solve(model, 10, 1e-3, scale, ratio)) return false;
+    if (!pixels.solve(model, 10, 1e-3, scale)) return false;
   }
+  const double most_noise = kMostNoise * std::abs(model.p[ContourModel::step]) / noise;
   if (effort == Effort::noisier) {
-    pixels.loosen(kMostNoise * std::abs(model.p[ContourModel::step]) / noise, kMostJitter);
+    pixels.loosen(most_noise, kMostJitter);
     pixels.weigh();
   }
-  for (int i = 0; i < 6; ++i) {
-    pixels.measure_sectors(tolerance());
-    if (!judge_sectors(pixels.sectors()) && i > 0) return true;
+  for (int pass = 0;; ++pass) {
+    bool settled = false;
+    for (int i = 0; i < 6 && !settled; ++i) {
+      pixels.measure_sectors(tolerance());
+      settled = !judge_sectors(pixels.sectors()) && i > 0;
+      if (settled) break;
+      pixels.weigh();
+      if (pixels.pixels() < 2 * ContourModel::kSize) return false;
+      if (!pixels.solve(model, 10, converged, 0)) return false;
+    }
+    if (effort != Effort::noisier || pass > 0 || !pixels.loosen_more(most_noise, kMostJitter)) return true;
     pixels.weigh();
-    if (pixels.pixels() < 2 * ContourModel::kSize) return false;
-    if (!pixels.solve(model, 10, converged, 0, ratio)) return false;
   }
-  return true;
 }
 
 /// From a start to an answer.
@@ -141,7 +148,7 @@ EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const Elli
   fit.state = EllipseState::no_fit;
   const PixelBox picture{0, 0, plane.values.width(), plane.values.height()};
   const Eigen::Vector2d origin = start.ellipse.center;
-  ContourFit pixels(plane, origin, std::sqrt(start.ellipse.a * start.ellipse.b));
+  ContourFit pixels(plane, origin, std::sqrt(start.ellipse.a * start.ellipse.b), ContourSum::quick);
   ContourModel model;
   const UnitFrame frame(start.ellipse);
   const double blur = std::clamp(start.blur_px, 0.5, 0.5 * start.ellipse.b + 0.5);
@@ -154,9 +161,9 @@ EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const Elli
   bool ring = false;
   for (int round = 0; round < 2; ++round) {
     const BandWidth band = band_of(model.p[ContourModel::blur], ellipse.b, options.inner_ratio, round > 0, ring);
-    pixels.gather(ellipse, band, sectors);
+    pixels.gather(ellipse, model, band, sectors, ring ? options.inner_ratio : 0);
     if (pixels.gathered() < 2 * ContourModel::kSize) return fit;
-    if (!fit_band(pixels, model, start_noise, effort, round > 0 ? 1e-5 : 1e-2, ring ? options.inner_ratio : 0)) {
+    if (!fit_band(pixels, model, start_noise, effort, round > 0)) {
       fit.visible = visible_share(pixels.sectors(), ellipse);
       if (fit.visible < options.min_visible) fit.state = EllipseState::occluded;
       return fit;

@@ -11,6 +11,7 @@ using Lanes = float __attribute__((vector_size(4 * kLanes)));
 using IntLanes = std::int32_t __attribute__((vector_size(4 * kLanes)));
 
 inline Lanes all(float v) { return Lanes{v, v, v, v, v, v, v, v}; }
+inline IntLanes all_bits(std::int32_t v) { return IntLanes{v, v, v, v, v, v, v, v}; }
 inline Lanes chosen(IntLanes where, Lanes yes, Lanes no) {
   return Lanes((IntLanes(yes) & where) | (IntLanes(no) & ~where));
 }
@@ -31,6 +32,26 @@ inline Lanes exp_of_negative(Lanes x) {
   p = p * f + all(5.0000001201e-1f);
   p = p * f * f + f + all(1);
   return Lanes(IntLanes(p) + (k << 23));
+}
+
+/// 1 / sqrt(x), x > 0, to 3e-7 of its value.
+inline Lanes inverse_root(Lanes x) {
+  Lanes y = Lanes(all_bits(0x5f3759df) - (IntLanes(x) >> 1));  // halves the exponent; each step doubles the digits
+  const Lanes half = all(0.5f) * x;
+  for (int i = 0; i < 3; ++i) y = y * (all(1.5f) - half * y * y);
+  return y;
+}
+
+/// The direction of (x, y) in -pi … pi, to 1e-4 rad (Abramowitz & Stegun 4.4.49, shortened).
+inline Lanes angle_of(Lanes y, Lanes x) {
+  const Lanes ax = Lanes(IntLanes(x) & 0x7fffffff), ay = Lanes(IntLanes(y) & 0x7fffffff);
+  const IntLanes steep = ay > ax;
+  const Lanes t = chosen(steep, ax, ay) / (chosen(steep, ay, ax) + all(1e-30f)), tt = t * t;
+  Lanes a = t * (all(0.9998660f) +
+                 tt * (all(-0.3302995f) + tt * (all(0.1801410f) + tt * (all(-0.0851330f) + tt * all(0.0208351f)))));
+  a = chosen(steep, all(1.57079633f) - a, a);
+  a = chosen(x < all(0), all(3.14159265f) - a, a);
+  return chosen(y < all(0), -a, a);
 }
 
 /// The normal distribution function at z, given e = exp(-z² / 2), to 1e-7 (Abramowitz & Stegun 7.1.26).
