@@ -181,7 +181,7 @@ Pose chosen_frame(const Network& n, int part, double* bend) {
   for (std::size_t b = 0; b < n.bodies.size(); ++b) {
     if (n.body_part[b] != part) continue;
     const AdjustedBody& body = n.bodies[b].body;
-    for (std::size_t k = 0; k < body.points.size(); ++k) points.push_back(body.point(k));
+    for (std::size_t k = 0; k < body.points.size(); ++k) points.push_back(body.point(k, n.print_scale));
     facing -= double(body.points.size()) * (body.world_from_body.rotation * Vector3d::UnitZ());
     std::size_t seen = 0;
     for (const int s : n.by_body[b]) seen += n.sightings[std::size_t(s)].counts;
@@ -357,7 +357,7 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
     CalibratedBody& body = n.bodies[b];
     body.placed = n.body_part[b] == 0;
     if (!body.placed) continue;
-    for (std::size_t k = 0; k < body.body.points.size(); ++k) body.points.push_back(body.body.point(k));
+    for (std::size_t k = 0; k < body.body.points.size(); ++k) body.points.push_back(body.body.point(k, n.print_scale));
     const int index = settled->body_of[b];
     if (index >= 0)
       for (const Matrix3d& covariance : result.point_covariances[std::size_t(index)])
@@ -365,10 +365,9 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
     else
       body.point_covariances.assign(body.points.size(), Matrix3d::Zero());
     if (options.model == BodyModel::bending)
-      for (const BodyPoint& p : body.body.points)
-        c.bend_m =
-            std::max(c.bend_m, std::abs(body.body.bend.dot(Vector3d(
-                                   p.place.x() * p.place.x(), p.place.x() * p.place.y(), p.place.y() * p.place.y()))));
+      for (std::size_t k = 0; k < body.points.size(); ++k)
+        c.bend_m = std::max(c.bend_m, std::abs((body.body.world_from_body.inverse() * body.points[k]).z() -
+                                               body.body.points[k].place.z()));
   }
   c.bodies = n.bodies;
   gather_figures(n, c);

@@ -17,6 +17,7 @@ constexpr int kLeastPhotos = 4;  // of a half
 
 struct Half {
   std::vector<CalibratedBody> bodies;
+  Eigen::Vector2d print_scale;
   std::vector<int> body_of;
   std::vector<std::vector<Eigen::Matrix3d>> covariances;
 };
@@ -45,7 +46,8 @@ void cross_validate(const Network& whole, SettleOptions options, Calibration& c,
     try {
       std::optional<Settled> settled = settle(half, 0, use, options, job);
       if (!settled) return;
-      halves[h] = {std::move(half.bodies), std::move(settled->body_of), std::move(settled->result.point_covariances)};
+      halves[h] = {std::move(half.bodies), half.print_scale, std::move(settled->body_of),
+                   std::move(settled->result.point_covariances)};
     } catch (const Error& e) {
       if (e.code() != ErrorCode::degenerate) throw;
       return;  // a half that falls apart says nothing
@@ -59,8 +61,8 @@ void cross_validate(const Network& whole, SettleOptions options, Calibration& c,
     for (std::size_t p = 0; p < halves[0].bodies[k].body.points.size(); ++p) {
       const Eigen::Matrix3d sum = halves[0].covariances[std::size_t(i)][p] + halves[1].covariances[std::size_t(j)][p];
       if (!sum.allFinite()) continue;
-      a.push_back(halves[0].bodies[k].body.point(p));
-      b.push_back(halves[1].bodies[k].body.point(p));
+      a.push_back(halves[0].bodies[k].body.point(p, halves[0].print_scale));
+      b.push_back(halves[1].bodies[k].body.point(p, halves[1].print_scale));
       expected += sum.trace();
     }
   }

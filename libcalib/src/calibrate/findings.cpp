@@ -35,7 +35,7 @@ int body_seen_instead(const Network& n, const Sighting& s, int part) {
     bool behind = false;
     for (const std::uint32_t k : s.seen) {
       const auto pixel = n.camera_of(s.photo).project(*n.cam_from_world[std::size_t(s.photo)] *
-                                                      other.body.point(std::size_t(n.seen[k].point)));
+                                                      other.body.point(std::size_t(n.seen[k].point), n.print_scale));
       if (!pixel) {
         behind = true;
         break;

@@ -104,7 +104,7 @@ PointMatch Network::match(const Seen& s, bool in_world) const {
   PointMatch m;
   m.pixel = s.pixel;
   m.covariance = s.covariance;
-  m.world = in_world ? body.point(std::size_t(s.point)) : p.place;
+  m.world = in_world ? body.point(std::size_t(s.point), print_scale) : p.place;
   m.radius = p.radius;
   m.normal = in_world ? Vector3d(body.world_from_body.rotation * p.normal) : p.normal;
   return m;

@@ -40,6 +40,7 @@ struct Network {
   std::span<const PhotoTargets> photos;
   std::vector<Camera> cameras;
   std::vector<CalibratedBody> bodies;  ///< placed: body.world_from_body holds
+  Eigen::Vector2d print_scale{1, 1};   ///< of all bodies' patterns
   std::vector<Seen> seen;
   std::vector<Sighting> sightings;
   std::vector<std::vector<int>> by_photo, by_body;  ///< indices into sightings

@@ -138,7 +138,7 @@ std::optional<Settled> settle(Network& n, int part, const std::vector<bool>& use
       if (body_in[b] && problem.bodies[std::size_t(settled.body_of[b])].free_places.empty()) {
         AdjustedBody& body = problem.bodies[std::size_t(settled.body_of[b])];
         std::vector<Eigen::Vector3d> places;
-        for (std::size_t k = 0; k < body.points.size(); ++k) places.push_back(n.bodies[b].body.point(k));
+        for (std::size_t k = 0; k < body.points.size(); ++k) places.push_back(n.bodies[b].body.point(k, n.print_scale));
         body.free_places = std::move(places);
       }
   if (problem.shots.empty() || problem.bodies.empty()) return std::nullopt;
@@ -160,6 +160,7 @@ std::optional<Settled> settle(Network& n, int part, const std::vector<bool>& use
     bar.body_a = std::uint32_t(a), bar.body_b = std::uint32_t(b);
     problem.bars.push_back(bar);
   }
+  problem.print_scale = n.print_scale;
   problem.free_print_scale = options.free_print_scale && !problem.bars.empty();
 
   AdjustOptions adjust_options;
@@ -169,6 +170,7 @@ std::optional<Settled> settle(Network& n, int part, const std::vector<bool>& use
   settled.result = adjust(problem, adjust_options, job);
 
   const Adjustment& now = settled.result.adjusted;
+  n.print_scale = now.print_scale;
   for (std::size_t c = 0; c < n.cameras.size(); ++c) {
     n.cameras[c] = now.cameras[c].camera;
     settled.cam_from_rig[c] = now.cameras[c].cam_from_rig;
