@@ -53,6 +53,7 @@ BundleProblem::BundleProblem(const Adjustment& start, const AdjustOptions& optio
   }
   lay_out();
   add_terms();
+  fit_free_bodies();
 }
 
 void BundleProblem::lay_out() {
@@ -181,6 +182,33 @@ Vector3d BundleProblem::point_of(const State& state, std::size_t body, std::size
   if (b.model == BodyModel::free) return state.places[first_point_[body] + point];
   return state.world_from_body[body] *
          shaped(b.points[point], b.model, middles_[body], state.bends[body], state.print_scale).place;
+}
+
+bool BundleProblem::fit_free_bodies() {
+  bool circles = false;
+  for (std::size_t b = 0; b < start_.bodies.size(); ++b) {
+    const AdjustedBody& body = start_.bodies[b];
+    if (body.model != BodyModel::free) continue;
+    Vector3d printed = Vector3d::Zero(), placed = Vector3d::Zero();
+    Eigen::Matrix3d product = Eigen::Matrix3d::Zero();
+    double count = 0;
+    for (const bool means : {true, false}) {
+      for (std::size_t i = 0; i < body.points.size(); ++i) {
+        if (body_block(b, i) < 0) continue;
+        circles |= body.points[i].radius > 0;
+        const Vector3d &x = body.points[i].place, &y = kept_.places[first_point_[b] + i];
+        if (means)
+          printed += x, placed += y, count += 1;
+        else
+          product += (y - placed) * (x - printed).transpose();
+      }
+      if (means) printed /= count, placed /= count;
+    }
+    const BestTurn best = best_turn(product);
+    if (best.unique) kept_.world_from_body[b] = Pose::from_matrix(best.rotation, placed - best.rotation * printed);
+  }
+  move(Eigen::VectorXd::Zero(unknowns_));
+  return circles;
 }
 
 /// What evaluations need of the state moved to.

@@ -27,6 +27,9 @@ class LUMIHULL_API BundleProblem final : public LeastSquares {
   /// nor, if scale_is_free, scaled by x about their mean.
   Eigen::MatrixXd datum() const;
   bool scale_is_free() const { return scale_is_free_; }
+  /// Gives free bodies, and with them their circles' normals, the pose that fits the printed pattern to their points;
+  /// moves there. While iterating normals stand still. Returns whether there are free circles.
+  bool fit_free_bodies();
   /// Keeps and moves to the state turned, shifted and, if scale_is_free, scaled back to where the bodies' points were
   /// at the start (Umeyama 1991). No residual changes.
   void align();

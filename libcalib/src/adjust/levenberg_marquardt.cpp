@@ -2,8 +2,10 @@
 
 #include <lumihull/base/error.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace lumihull::calib::bundle {
 
@@ -24,29 +26,33 @@ MinimizeResult minimize(LeastSquares& problem, NormalEquations& equations, doubl
       lambda *= growth;
       growth *= 2;
     };
-    if (equations.factorize(lambda, problem.gauge(), 0, job)) {
+    const Eigen::MatrixXd gauge = problem.gauge();
+    if (equations.factorize(lambda, gauge, 0, job)) {
       refuse();
       continue;
     }
-    const Eigen::VectorXd step = equations.solve(-equations.gradient(), job);
+    // What is left of the gradient along the gauge, rounding or a neglected effect, is not followed: nothing would end
+    // it.
+    const Eigen::MatrixXd weighted = equations.diagonal().asDiagonal() * gauge;
+    const Eigen::VectorXd gradient =
+        equations.gradient() -
+        weighted * (gauge.transpose() * weighted).ldlt().solve(gauge.transpose() * equations.gradient());
+    const Eigen::VectorXd step = equations.solve(-gradient, job);
     // Gain of the quadratic model, -2 gᵀδ - δᵀHδ, by what δ solves.
-    const double predicted = -equations.gradient().dot(step) +
-                             lambda * step.dot(equations.diagonal().cwiseProduct(step)) +
+    const double predicted = -gradient.dot(step) + lambda * step.dot(equations.diagonal().cwiseProduct(step)) +
                              equations.along_gauge(step).squaredNorm();
-    const bool last = predicted <= options.tolerance * result.cost || result.cost <= rounding;
-    const auto cost = step.allFinite() && problem.move(step) ? equations.cost(problem, job) : std::nullopt;
-    const double gain = cost ? result.cost - *cost : -1;
+    double cost = std::numeric_limits<double>::infinity();
+    if (step.allFinite() && problem.move(step)) cost = equations.cost(problem, job).value_or(cost);
+    const double gain = result.cost - cost;
+    // A loss that small is the derivatives' or rounding's; a gain that small under heavy damping is no sign of the end.
+    const double least = options.tolerance * result.cost;
+    result.converged = lambda < 1 && (predicted <= least || std::abs(gain) <= least || result.cost <= rounding);
     if (!(gain >= 0) || !(predicted > 0)) {
-      if (last) {
-        result.converged = lambda < 1;  // not where only the damping makes it stand still
-        if (result.converged) break;
-      }
       refuse();
       continue;
     }
     problem.keep();
-    result.converged = (last || gain <= options.tolerance * result.cost) && lambda < 1;
-    result.cost = *cost;
+    result.cost = cost;
     const double share = gain / predicted;
     lambda = std::max(lambda * std::clamp(1 - std::pow(2 * share - 1, 3), 0.05, 2.0), 1e-14);
     growth = 2;
