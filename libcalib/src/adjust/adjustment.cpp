@@ -76,28 +76,6 @@ void fill_covariances(const Adjustment& a, BundleProblem& problem, NormalEquatio
   }
 }
 
-/// Circles' normals of free bodies change what is seen by little, and follow the points in rounds.
-bundle::MinimizeResult minimize(BundleProblem& problem, NormalEquations& equations, double start_cost,
-                                const AdjustOptions& options, Job& job) {
-  constexpr int kRounds = 10;
-  bundle::MinimizeResult result{.start_cost = start_cost, .cost = start_cost};
-  for (int round = 0; round < kRounds; ++round) {
-    const double before = result.cost;
-    const auto one = bundle::minimize(problem, equations, before,
-                                      {options.max_iterations - result.iterations, options.tolerance}, job);
-    result.iterations += one.iterations, result.converged = one.converged, result.cost = one.cost;
-    if (!problem.fit_free_bodies() || !result.converged) break;
-    const auto renewed = equations.linearize(problem, job);
-    if (!renewed) break;
-    const bool same = std::abs(*renewed - result.cost) <= std::max(options.tolerance, 1e-12) * result.cost + 1e-12;
-    result.cost = *renewed;
-    if (same) break;
-    result.converged = false;
-    if (result.iterations >= options.max_iterations) break;
-  }
-  return result;
-}
-
 }  // namespace
 
 void AdjustOptions::validate() const {
@@ -120,7 +98,8 @@ AdjustResult adjust(const Adjustment& start, const AdjustOptions& options, Job& 
   if (!start_cost) throw Error(ErrorCode::bad_input, "the start's residuals are not finite", "adjustment");
   bundle::check_determined(problem, equations);
 
-  const bundle::MinimizeResult minimum = minimize(problem, equations, *start_cost, options, job);
+  const bundle::MinimizeResult minimum =
+      bundle::minimize(problem, equations, *start_cost, {options.max_iterations, options.tolerance}, job);
   problem.align();
 
   AdjustResult result;

@@ -27,9 +27,6 @@ class LUMIHULL_API BundleProblem final : public LeastSquares {
   /// nor, if scale_is_free, scaled by x about their mean.
   Eigen::MatrixXd datum() const;
   bool scale_is_free() const { return scale_is_free_; }
-  /// Gives free bodies, and with them their circles' normals, the pose that fits the printed pattern to their points;
-  /// moves there. While iterating normals stand still. Returns whether there are free circles.
-  bool fit_free_bodies();
   /// Keeps and moves to the state turned, shifted and, if scale_is_free, scaled back to where the bodies' points were
   /// at the start (Umeyama 1991). No residual changes.
   void align();
@@ -76,6 +73,7 @@ class LUMIHULL_API BundleProblem final : public LeastSquares {
   };
   struct PlacedPoint {
     Eigen::Vector3d place{0, 0, 0}, normal{0, 0, 1};  ///< in the world
+    double radius = 0;
   };
   struct PlacedBody {
     Eigen::Matrix3d rotation;  ///< world_from_body
@@ -85,6 +83,7 @@ class LUMIHULL_API BundleProblem final : public LeastSquares {
   void lay_out();
   void add_terms();
   void place();
+  double fit_pose(std::size_t body);
   bool predict(const Seen& seen, Eigen::Vector2d& pixel) const;
   double evaluate_observation(const Seen& seen, double* residual, double* jacobian) const;
   double evaluate_bar(const ScaleBar& bar, double* residual, double* jacobian) const;

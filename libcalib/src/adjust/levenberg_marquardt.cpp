@@ -2,7 +2,6 @@
 
 #include <lumihull/base/error.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -26,27 +25,23 @@ MinimizeResult minimize(LeastSquares& problem, NormalEquations& equations, doubl
       lambda *= growth;
       growth *= 2;
     };
-    const Eigen::MatrixXd gauge = problem.gauge();
-    if (equations.factorize(lambda, gauge, 0, job)) {
+    if (equations.factorize(lambda, problem.gauge(), 0, job)) {
       refuse();
       continue;
     }
-    // What is left of the gradient along the gauge, rounding or a neglected effect, is not followed: nothing would end
-    // it.
-    const Eigen::MatrixXd weighted = equations.diagonal().asDiagonal() * gauge;
-    const Eigen::VectorXd gradient =
-        equations.gradient() -
-        weighted * (gauge.transpose() * weighted).ldlt().solve(gauge.transpose() * equations.gradient());
-    const Eigen::VectorXd step = equations.solve(-gradient, job);
+    const Eigen::VectorXd step = equations.solve(-equations.gradient(), job);
     // Gain of the quadratic model, -2 gᵀδ - δᵀHδ, by what δ solves.
-    const double predicted = -gradient.dot(step) + lambda * step.dot(equations.diagonal().cwiseProduct(step)) +
+    const double predicted = -equations.gradient().dot(step) +
+                             lambda * step.dot(equations.diagonal().cwiseProduct(step)) +
                              equations.along_gauge(step).squaredNorm();
     double cost = std::numeric_limits<double>::infinity();
     if (step.allFinite() && problem.move(step)) cost = equations.cost(problem, job).value_or(cost);
     const double gain = result.cost - cost;
-    // A loss that small is the derivatives' or rounding's; a gain that small under heavy damping is no sign of the end.
-    const double least = options.tolerance * result.cost;
-    result.converged = lambda < 1 && (predicted <= least || std::abs(gain) <= least || result.cost <= rounding);
+    // A gain that small under heavy damping is no sign of the end. A loss that small is that of rounding, or of what
+    // derivatives neglect.
+    const double least = options.tolerance * result.cost, neglected = problem.neglected * result.cost;
+    result.converged = lambda < 1 && (predicted <= least || (gain <= least && gain >= -std::max(least, neglected)) ||
+                                      result.cost <= rounding);
     if (!(gain >= 0) || !(predicted > 0)) {
       refuse();
       continue;

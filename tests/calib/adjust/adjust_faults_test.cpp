@@ -118,6 +118,9 @@ TEST(AdjustFaults, PartsThatShareNothingAreNamed) {
 TEST(AdjustFaults, UnknownsThatCanNotBeToldApart) {
   // One photograph of one flat target: its focal length and distance.
   Adjustment start = test::make_scene({.shots = 1, .bodies = 1, .noise = 0, .off = 0}, 3).start;
+  Camera& camera = start.cameras[0].camera;
+  camera.k1 = camera.k2 = camera.p1 = camera.p2 = 0;
+  for (calib::Observation& o : start.observations) o.pixel = test::predicted_pixel(start, o);
   start.cameras[0].free = {true, true, false, true, true, false, false, false, false, false};
   const Error error = refused(start);
   EXPECT_EQ(error.code(), ErrorCode::degenerate);

@@ -131,7 +131,7 @@ Vector2d predicted_pixel(const calib::Adjustment& state, const calib::Observatio
   const calib::BodyPoint& point = body.points[o.point];
   calib::Circle3 circle;
   circle.center = cam_from_world * body.point(o.point, state.print_scale);
-  circle.radius = point.radius * (body.model == calib::BodyModel::free ? 1 : state.print_scale.mean());
+  circle.radius = point.radius * state.print_scale.mean();
   Vector3d normal = point.normal;
   if (body.model == calib::BodyModel::bending) {
     // By differences over the surface: independent of the library's formula.
@@ -151,7 +151,9 @@ Vector2d predicted_pixel(const calib::Adjustment& state, const calib::Observatio
   if (body.model == calib::BodyModel::free && point.radius > 0) {
     std::vector<Vector3d> printed;
     for (const calib::BodyPoint& p : body.points) printed.push_back(p.place);
-    world_from_body = Similarity(printed, body.free_places).turn;
+    const Similarity fit(printed, body.free_places);
+    world_from_body = fit.turn;
+    circle.radius = point.radius * fit.scale;
   }
   normal = cam_from_world.rotation * (world_from_body * normal);
   circle.u = normal.unitOrthogonal();
