@@ -92,17 +92,27 @@ void add_bodies(const SceneMaker& maker, calib::Adjustment& truth, Dice& dice) {
   }
 }
 
+/// Cosine of the angle between a circle's normal and the line of sight. Nobody measures an ellipse seen from its edge,
+/// and nobody predicts it: it is thinner than the lens bends it.
+double slant(const calib::Adjustment& state, const calib::Observation& o) {
+  const calib::AdjustedBody& body = state.bodies[o.body];
+  const Pose pose = state.cameras[o.camera].cam_from_rig * state.shots[o.shot].rig_from_world;
+  return std::abs((pose.rotation * (body.world_from_body.rotation * body.points[o.point].normal))
+                      .dot((pose * body.point(o.point)).normalized()));
+}
+
 void add_observations(const SceneMaker& maker, calib::Adjustment& truth, Dice& dice) {
   for (std::size_t s = 0; s < truth.shots.size(); ++s)
     for (std::size_t c = 0; c < truth.cameras.size(); ++c)
       for (std::size_t b = 0; b < truth.bodies.size(); ++b) {
-        if (maker.seen < 1 && dice.uniform(0, 1) > maker.seen) continue;
+        if (maker.seen < 1 && dice.uniform(0, 1) > maker.seen && b != s % truth.bodies.size()) continue;
         for (std::size_t i = 0; i < truth.bodies[b].points.size(); ++i) {
           calib::Observation o;
           o.shot = std::uint32_t(s), o.camera = std::uint32_t(c), o.body = std::uint32_t(b), o.point = std::uint32_t(i);
           const Vector2d pixel = predicted_pixel(truth, o);
           const double tilt = dice.uniform(-0.4, 0.4), along = dice.uniform(0.7, 1.4);
           const Vector2d noise(dice.normal(), dice.normal());
+          if (maker.radius > 0 && slant(truth, o) < 0.2) continue;
           if (!pixel.allFinite() || (maker.inside && !truth.cameras[c].camera.contains(pixel))) continue;
           Eigen::Matrix2d root;
           root << along, 0, tilt, 1 / along;
