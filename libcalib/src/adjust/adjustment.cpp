@@ -32,7 +32,7 @@ void fill_covariances(const Adjustment& a, BundleProblem& problem, NormalEquatio
                       Job& job) {
   if (!equations.linearize(problem, job)) throw Error(ErrorCode::internal, "the answer can't be evaluated again");
   const Eigen::MatrixXd gauge = problem.gauge();
-  constexpr double kLeastShare = 1e-12;
+  constexpr double kLeastShare = 1e-13;  // rounding leaves 1e-15
   if (const auto weak = equations.factorize(0, gauge, kLeastShare, job))
     throw Error(ErrorCode::degenerate, "the observations do not determine it beside the other unknowns",
                 problem.name(*weak));

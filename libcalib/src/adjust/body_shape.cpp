@@ -1,5 +1,9 @@
 #include "body_shape.h"
 
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+
 namespace lumihull::calib::bundle {
 
 Eigen::Vector3d middle(const AdjustedBody& body) {
@@ -40,6 +44,14 @@ ShapedPoint shaped(const BodyPoint& point, BodyModel model, const Eigen::Vector3
       turn_by->col(i) = sheared.cross(-n_z * Eigen::Vector3d(slopes(0, i), slopes(1, i), 0)) / sheared.squaredNorm();
   }
   return shape;
+}
+
+BestTurn best_turn(const Eigen::Matrix3d& product) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d sign(1, 1, 1);
+  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1;
+  const Eigen::Vector3d& s = svd.singularValues();
+  return {svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose(), s.dot(sign), s[1] > 1e-9 * s[0]};
 }
 
 }  // namespace lumihull::calib::bundle

@@ -22,4 +22,13 @@ struct ShapedPoint {
 ShapedPoint shaped(const BodyPoint& point, BodyModel model, const Eigen::Vector3d& middle, const Eigen::Vector3d& bend,
                    const Eigen::Vector2d& print_scale, Matrix35d* place_by = nullptr, Matrix35d* turn_by = nullptr);
 
+/// R of least Σ |y - R x|² from Σ y xᵀ about the means (Umeyama 1991, eqs. 40 to 42), and the scale's numerator tr(D
+/// S).
+struct BestTurn {
+  Eigen::Matrix3d rotation;
+  double trace = 0;
+  bool unique = false;  ///< false: the points lie on a line, and any turn about it is as good
+};
+BestTurn best_turn(const Eigen::Matrix3d& product);
+
 }  // namespace lumihull::calib::bundle

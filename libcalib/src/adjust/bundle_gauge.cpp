@@ -1,6 +1,5 @@
 // What the measurements do not see: where the world is, how it is turned and, sometimes, how large it is.
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 
 #include "../lens/point_term.h"
 #include "body_shape.h"
@@ -112,7 +111,7 @@ void BundleProblem::point_jacobian(std::size_t body, std::size_t point,
 }
 
 void BundleProblem::align() {
-  // X' = scale R X + t, least squares (Umeyama 1991, eqs. 40 to 42).
+  // X' = scale R X + t
   const Vector3d now = mean_point(kept_), before = mean_point(begin_);
   Matrix3d product = Matrix3d::Zero();
   double extent = 0;
@@ -123,12 +122,9 @@ void BundleProblem::align() {
     product += y * x.transpose();
     extent += x.squaredNorm();
   }
-  const Eigen::JacobiSVD<Matrix3d> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Vector3d sign(1, 1, 1);
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1;
-  const double scale = scale_is_free_ && extent > 0 ? svd.singularValues().dot(sign) / extent : 1;
-  const Matrix3d rotated = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-  const Pose turn = Pose::from_matrix(rotated, before - scale * rotated * now);
+  const BestTurn best = best_turn(product);
+  const double scale = scale_is_free_ && extent > 0 ? best.trace / extent : 1;
+  const Pose turn = Pose::from_matrix(best.rotation, before - scale * best.rotation * now);
   const Vector3d offset = offset_of_rig();
 
   for (Pose& pose : kept_.rig_from_world) {

@@ -35,6 +35,7 @@ BundleProblem::BundleProblem(const Adjustment& start, const AdjustOptions& optio
     }
   }
   kept_.print_scale = start.print_scale;
+  blocks_of_points_.assign(points_.size(), 0);  // all may be observed
   moved_ = begin_ = kept_;
   place();
 
@@ -53,6 +54,11 @@ BundleProblem::BundleProblem(const Adjustment& start, const AdjustOptions& optio
   }
   lay_out();
   add_terms();
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    if (points_[i]->radius > 0)
+      neglected = std::max(neglected, start.bodies[body_of_point_[i]].model == BodyModel::free ? 1e-5 : 1e-6);
+  place();  // free bodies by those points only that are observed
+  keep();
 }
 
 void BundleProblem::lay_out() {
@@ -183,6 +189,31 @@ Vector3d BundleProblem::point_of(const State& state, std::size_t body, std::size
          shaped(b.points[point], b.model, middles_[body], state.bends[body], state.print_scale).place;
 }
 
+/// A free body's pose, and with it its circles' normals, is the fit of the printed pattern to its points. Returns the
+/// fit's scale, by which circles are larger than printed.
+double BundleProblem::fit_pose(std::size_t body) {
+  const AdjustedBody& b = start_.bodies[body];
+  Vector3d printed = Vector3d::Zero(), placed = Vector3d::Zero();
+  const auto for_observed = [&](const auto& add) {
+    for (std::size_t i = 0; i < b.points.size(); ++i)
+      if (body_block(body, i) >= 0) add(b.points[i].place, moved_.places[first_point_[body] + i]);
+  };
+  double count = 0;
+  for_observed([&](const Vector3d& x, const Vector3d& y) { printed += x, placed += y, count += 1; });
+  if (count < 3) return 1;
+  printed /= count, placed /= count;
+  Eigen::Matrix3d product = Eigen::Matrix3d::Zero();
+  double extent = 0;
+  for_observed([&](const Vector3d& x, const Vector3d& y) {
+    product += (y - placed) * (x - printed).transpose();
+    extent += (x - printed).squaredNorm();
+  });
+  const BestTurn best = best_turn(product);
+  if (!best.unique) return 1;
+  moved_.world_from_body[body] = Pose::from_matrix(best.rotation, placed - best.rotation * printed);
+  return best.trace / extent;
+}
+
 /// What evaluations need of the state moved to.
 void BundleProblem::place() {
   lenses_.clear(), rig_rotations_.clear();
@@ -198,16 +229,18 @@ void BundleProblem::place() {
   bodies_.resize(start_.bodies.size());
   for (std::size_t b = 0; b < start_.bodies.size(); ++b) {
     const AdjustedBody& body = start_.bodies[b];
+    const double scale = body.model == BodyModel::free ? fit_pose(b) : moved_.print_scale.mean();
     bodies_[b] = {moved_.world_from_body[b].rotation.toRotationMatrix(), center_of(moved_, b)};
     for (std::size_t i = 0; i < body.points.size(); ++i) {
       PlacedPoint& placed = placed_[first_point_[b] + i];
+      const double radius = scale * body.points[i].radius;
       if (body.model == BodyModel::free) {
-        placed = {moved_.places[first_point_[b] + i], bodies_[b].rotation * body.points[i].normal.normalized()};
+        placed = {moved_.places[first_point_[b] + i], bodies_[b].rotation * body.points[i].normal.normalized(), radius};
         continue;
       }
       const ShapedPoint shape = shaped(body.points[i], body.model, middles_[b], moved_.bends[b], moved_.print_scale);
       placed = {bodies_[b].rotation * shape.place + moved_.world_from_body[b].translation,
-                bodies_[b].rotation * shape.normal};
+                bodies_[b].rotation * shape.normal, radius};
     }
   }
 }

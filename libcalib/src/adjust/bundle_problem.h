@@ -73,6 +73,7 @@ class LUMIHULL_API BundleProblem final : public LeastSquares {
   };
   struct PlacedPoint {
     Eigen::Vector3d place{0, 0, 0}, normal{0, 0, 1};  ///< in the world
+    double radius = 0;
   };
   struct PlacedBody {
     Eigen::Matrix3d rotation;  ///< world_from_body
@@ -82,6 +83,7 @@ class LUMIHULL_API BundleProblem final : public LeastSquares {
   void lay_out();
   void add_terms();
   void place();
+  double fit_pose(std::size_t body);
   bool predict(const Seen& seen, Eigen::Vector2d& pixel) const;
   double evaluate_observation(const Seen& seen, double* residual, double* jacobian) const;
   double evaluate_bar(const ScaleBar& bar, double* residual, double* jacobian) const;

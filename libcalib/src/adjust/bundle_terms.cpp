@@ -34,12 +34,10 @@ bool BundleProblem::predict(const Seen& seen, Vector2d& pixel) const {
   const ViewOf& view = views_[seen.shot * start_.cameras.size() + seen.camera];
   const PlacedPoint& placed = placed_[seen.point];
   const Vector3d in_camera = view.rotation * placed.place + view.translation;
-  const double radius = points_[seen.point]->radius;
+  const double radius = placed.radius;
   if (radius > 0) {
-    const bool scaled = start_.bodies[seen.body].model != BodyModel::free;
-    const auto center = projected_circle_center(
-        moved_.cameras[seen.camera],
-        circle_at(in_camera, view.rotation * placed.normal, scaled ? radius * moved_.print_scale.mean() : radius));
+    const auto center = projected_circle_center(moved_.cameras[seen.camera],
+                                                circle_at(in_camera, view.rotation * placed.normal, radius));
     if (!center) return false;
     pixel = *center;
     return true;
@@ -80,7 +78,7 @@ double BundleProblem::evaluate_observation(const Seen& seen, double* residual, d
   const ViewOf& view = views_[seen.shot * start_.cameras.size() + seen.camera];
   const PlacedPoint& placed = placed_[seen.point];
   const Vector3d in_camera = view.rotation * placed.place + view.translation;
-  const double radius = points_[seen.point]->radius;
+  const double radius = placed.radius;
   const LeanLens& lens = lenses_[seen.camera];
 
   Vector2d pixel, enlarged(0, 0);
@@ -100,17 +98,15 @@ double BundleProblem::evaluate_observation(const Seen& seen, double* residual, d
   } else if (!jacobian) {
     if (!predict(seen, pixel)) return kLost;
   } else {
-    const bool scaled = start_.bodies[seen.body].model != BodyModel::free;
     Eigen::Matrix<double, 2, kIntrinsics> parameters;
-    const auto center = projected_circle_center(
-        lens.camera(),
-        circle_at(in_camera, view.rotation * placed.normal, scaled ? radius * moved_.print_scale.mean() : radius),
-        &by_pose, free_lens ? &parameters : nullptr);
+    const auto center =
+        projected_circle_center(lens.camera(), circle_at(in_camera, view.rotation * placed.normal, radius), &by_pose,
+                                free_lens ? &parameters : nullptr);
     if (!center) return kLost;
     pixel = *center;
     Eigen::Map<Eigen::Matrix<double, 2, kIntrinsics, Eigen::RowMajor>>{by_intrinsics} = parameters;
     // The circle's centre is seen off by about radius², and the print scale enlarges the radius.
-    if (scaled && print_block_ >= 0 && lens.see(in_camera, seen.pixel, at))
+    if (print_block_ >= 0 && lens.see(in_camera, seen.pixel, at))
       enlarged = (pixel - at.pixel) / moved_.print_scale.mean();
   }
 
@@ -157,7 +153,13 @@ void BundleProblem::fill_jacobian(const Seen& seen, const Vector3d& in_camera, c
 
   for (int r = 0; r < 2; ++r) {
     double* out = jacobian + r * width;
-    const Vector3d turn = by_pose.row(r).head<3>(), shift = by_pose.row(r).tail<3>();
+    Vector3d turn = by_pose.row(r).head<3>(), shift = by_pose.row(r).tail<3>();
+    // A free circle's normal and size hang on all of its body's points: derivatives are as if it were a point where its
+    // ellipse's centre is seen, so that turning and scaling all changes nothing.
+    if (body.model == BodyModel::free) {
+      shift -= in_camera * (in_camera.dot(shift) / in_camera.squaredNorm());
+      turn = in_camera.cross(shift);
+    }
     if (is_rigged(seen.camera)) {
       // A motion (ω, t) of the rig is one of the camera by (R ω, R t - R ω x t_camera).
       const Matrix3d& rotation = rig_rotations_[seen.camera];

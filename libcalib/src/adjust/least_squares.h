@@ -31,6 +31,8 @@ class LeastSquares {
   /// Blocks that are eliminated first. No term touches two of them.
   std::vector<char> eliminated;
   std::vector<Term> terms;
+  /// Share of the cost that approximate derivatives may leave on the table: a step that loses no more is the end.
+  double neglected = 0;
 
   /// A term at the state last moved to; may be called from several threads. Returns its cost, >= 0; anything else: it
   /// can't be evaluated there. jacobian, if wanted: term.rows x (columns of the term's blocks, in the term's order),

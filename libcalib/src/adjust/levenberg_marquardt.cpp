@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace lumihull::calib::bundle {
 
@@ -33,20 +34,20 @@ MinimizeResult minimize(LeastSquares& problem, NormalEquations& equations, doubl
     const double predicted = -equations.gradient().dot(step) +
                              lambda * step.dot(equations.diagonal().cwiseProduct(step)) +
                              equations.along_gauge(step).squaredNorm();
-    const bool last = predicted <= options.tolerance * result.cost || result.cost <= rounding;
-    const auto cost = step.allFinite() && problem.move(step) ? equations.cost(problem, job) : std::nullopt;
-    const double gain = cost ? result.cost - *cost : -1;
+    double cost = std::numeric_limits<double>::infinity();
+    if (step.allFinite() && problem.move(step)) cost = equations.cost(problem, job).value_or(cost);
+    const double gain = result.cost - cost;
+    // A gain that small under heavy damping is no sign of the end. A loss that small is that of rounding, or of what
+    // derivatives neglect.
+    const double least = options.tolerance * result.cost, neglected = problem.neglected * result.cost;
+    result.converged = lambda < 1 && (predicted <= least || (gain <= least && gain >= -std::max(least, neglected)) ||
+                                      result.cost <= rounding);
     if (!(gain >= 0) || !(predicted > 0)) {
-      if (last) {
-        result.converged = lambda < 1;  // not where only the damping makes it stand still
-        if (result.converged) break;
-      }
       refuse();
       continue;
     }
     problem.keep();
-    result.converged = (last || gain <= options.tolerance * result.cost) && lambda < 1;
-    result.cost = *cost;
+    result.cost = cost;
     const double share = gain / predicted;
     lambda = std::max(lambda * std::clamp(1 - std::pow(2 * share - 1, 3), 0.05, 2.0), 1e-14);
     growth = 2;

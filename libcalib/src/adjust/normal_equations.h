@@ -47,7 +47,7 @@ class LUMIHULL_API NormalEquations {
 
   /// Factors H + λ diag(H) + M Mᵀ, where M spans the gauge within the kept blocks, scaled by diag(H): what the gauge
   /// leaves singular becomes regular, and a solution of equations that the gauge does not touch stays one. Returns the
-  /// block at which it is not positive definite (pivot below `least_share` of its diagonal).
+  /// block at which it is not positive definite (a pivot of S not above `least_share` of H's diagonal).
   std::optional<std::size_t> factorize(double lambda, const Eigen::MatrixXd& gauge, double least_share, Job& job);
   /// (That matrix)⁻¹ right.
   Eigen::MatrixXd solve(const Eigen::MatrixXd& right, Job& job) const;

@@ -132,7 +132,7 @@ std::optional<std::size_t> NormalEquations::factorize(double lambda, const Matri
       if (panel.tile[i] >= 0 && panel.tile[j] >= 0) block.noalias() -= tile(panel, i).transpose() * tile(panel, j);
   });
   add_kept(lambda);
-  const auto bad = bundle::factorize(reduced_, tiles_, least_share, job);
+  const auto bad = bundle::factorize(reduced_, tiles_, least_share * root.cwiseAbs2(), job);
   if (!bad) return std::nullopt;
   for (const std::size_t b : kept_blocks_)
     if (*bad < kept_column_[b] + sizes_[b]) return b;

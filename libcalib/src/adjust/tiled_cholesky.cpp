@@ -7,11 +7,11 @@ namespace {
 
 /// One tile on the diagonal, row by row.
 std::optional<Eigen::Index> factorize_tile(Eigen::Ref<Eigen::MatrixXd> a,
-                                           const Eigen::Ref<const Eigen::VectorXd>& diagonal, double least_share) {
+                                           const Eigen::Ref<const Eigen::VectorXd>& least) {
   const Eigen::Index n = a.rows();
   for (Eigen::Index k = 0; k < n; ++k) {
     const double pivot = a(k, k) - a.row(k).head(k).squaredNorm();
-    if (!(pivot > least_share * diagonal[k]) || !(pivot > 0)) return k;
+    if (!(pivot > least[k]) || !(pivot > 0)) return k;
     const Eigen::Index below = n - k - 1;
     a(k, k) = std::sqrt(pivot);
     if (k > 0) a.col(k).tail(below).noalias() -= a.bottomLeftCorner(below, k) * a.row(k).head(k).transpose();
@@ -22,8 +22,7 @@ std::optional<Eigen::Index> factorize_tile(Eigen::Ref<Eigen::MatrixXd> a,
 
 }  // namespace
 
-std::optional<Eigen::Index> factorize(Eigen::MatrixXd& a, const Tiles& tiles, double least_share, Job& job) {
-  const Eigen::VectorXd diagonal = a.diagonal();
+std::optional<Eigen::Index> factorize(Eigen::MatrixXd& a, const Tiles& tiles, const Eigen::VectorXd& least, Job& job) {
   const std::size_t count = tiles.size() - 1;
   for (std::size_t k = 0; k < count; ++k) {
     const Eigen::Index begin = tiles[k], width = tiles[k + 1] - begin;
@@ -34,7 +33,7 @@ std::optional<Eigen::Index> factorize(Eigen::MatrixXd& a, const Tiles& tiles, do
         target.noalias() -=
             a.block(tiles[k + i], 0, target.rows(), begin) * a.block(begin, 0, width, begin).transpose();
       });
-    const auto bad = factorize_tile(tile(k), diagonal.segment(begin, width), least_share);
+    const auto bad = factorize_tile(tile(k), least.segment(begin, width));
     if (bad) return begin + *bad;
     const auto corner = tile(k);
     parallel_for(job, count - k - 1, [&](std::size_t i) {

@@ -18,9 +18,9 @@ using Tiles = std::vector<Eigen::Index>;
 /// from left to right, each updated by all that are left of it (Golub & Van Loan 2013, 4.2.9). The same bytes for any
 /// number of threads.
 ///
-/// Returns the first column whose pivot is not above `least_share` of its diagonal element in A (A is not positive
+/// least: of each column. Returns the first column whose pivot is not above both this and 0 (A is not positive
 /// definite, or nearly not); nothing where all are.
-LUMIHULL_API std::optional<Eigen::Index> factorize(Eigen::MatrixXd& a, const Tiles& tiles, double least_share,
+LUMIHULL_API std::optional<Eigen::Index> factorize(Eigen::MatrixXd& a, const Tiles& tiles, const Eigen::VectorXd& least,
                                                    Job& job);
 
 }  // namespace lumihull::calib::bundle

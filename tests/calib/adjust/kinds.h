@@ -25,6 +25,7 @@ inline std::vector<Kind> kinds() {
       {"free with bars", {.model = BodyModel::free, .bars = 2}},
       {"free on a rig", {.model = BodyModel::free, .cameras = 2}},
       {"circles", {.radius = 0.009}},
+      {"free circles", {.radius = 0.009, .model = BodyModel::free}},
       {"circles, bent, print",
        {.radius = 0.009, .model = BodyModel::bending, .bend = 0.3, .print_scale = print, .bars = 2}},
       {"more bodies than shots", {.shots = 5, .bodies = 14}},

@@ -33,7 +33,7 @@ struct AdjustedShot {
 enum class BodyModel : std::uint8_t {
   rigid,    ///< six unknowns: the printed pattern moves as a whole
   bending,  ///< and bends along its z: a x² + b x y + c y² over its own extent, drawn to zero by `bend_sigma`
-  free,     ///< three unknowns for each point, the printed pattern is only the start
+  free,  ///< three unknowns for each point, the printed pattern is only the start; circles turn and grow with its fit
 };
 
 /// A point of a body; a circle's centre where radius > 0.
@@ -48,8 +48,8 @@ struct AdjustedBody {
   std::string name;
   std::vector<BodyPoint> points;
   BodyModel model = BodyModel::rigid;
-  Pose world_from_body;
-  Eigen::Vector3d bend{0, 0, 0};             ///< a, b, c of BodyModel::bending, 1/m
+  Pose world_from_body;           ///< in an answer's free bodies: the fit of the printed pattern to its points
+  Eigen::Vector3d bend{0, 0, 0};  ///< a, b, c of BodyModel::bending, 1/m
   std::vector<Eigen::Vector3d> free_places;  ///< BodyModel::free: where the points are in the world; empty: as printed
 
   /// Where a point is in the world: of a rigid or bending body by its pose, bend and the print scale; of a free one its
