@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <tuple>
 
 #include "support.h"
 
@@ -107,6 +108,49 @@ TEST(Capture, WrongFieldsAreNamedByPointer) {
   EXPECT_THAT(complaint("cameras.json", cameras, "\"f\": 10.0", "\"f\": 1e999"), HasSubstr("1e999"));
   EXPECT_THAT(complaint("cameras.json", cameras, "0.5,", "0.6,"), HasSubstr("/cam_from_world/p0/q"));
   EXPECT_THAT(complaint("cameras.json", cameras, "\"p2\": {", "\"p9\": {"), HasSubstr("/cam_from_world/p9"));
+}
+
+TEST(Capture, KeepsHowWellCamerasAndPosesAreKnown) {
+  const test::TemporaryFolder folder;
+  Capture capture = small_capture(folder / "c");
+  capture.save();
+  EXPECT_THAT(read_file(folder / "c/cameras.json"), HasSubstr("\"version\": 1")) << "nothing that is new: as before";
+  Eigen::Matrix<double, 6, 6> pose = Eigen::Matrix<double, 6, 6>::Identity() * 1e-9;
+  pose(0, 4) = pose(4, 0) = 1.0 / 3e9;
+  capture.shots[2].pose_quality = PoseQuality{pose, 75, 0.0421};
+  capture.shots[1].pose_quality = PoseQuality{pose, 9, 1};  // without a pose: not kept
+  Eigen::Matrix<double, 10, 10> intrinsics = Eigen::Matrix<double, 10, 10>::Zero();
+  intrinsics(0, 0) = 0.25, intrinsics(3, 3) = 0.5, intrinsics(0, 3) = intrinsics(3, 0) = -0.1;
+  capture.camera_covariances[0] = intrinsics;
+  capture.save();
+  const std::string text = read_file(folder / "c/cameras.json");
+  const Capture again = Capture::open(folder / "c");
+  ASSERT_TRUE(again.shots[2].pose_quality.has_value());
+  EXPECT_EQ(again.shots[2].pose_quality->covariance, pose);
+  EXPECT_EQ(again.shots[2].pose_quality->points, 75);
+  EXPECT_EQ(again.shots[2].pose_quality->rms_px, 0.0421);
+  EXPECT_FALSE(again.shots[0].pose_quality || again.shots[1].pose_quality);
+  EXPECT_EQ(again.camera_covariances.at(0), intrinsics);
+  again.save();
+  EXPECT_EQ(read_file(folder / "c/cameras.json"), text);
+
+  for (const auto& [from, to, place] : {std::tuple{"\"points\": 75", "\"points\": -1", "/pose_quality/p2/points"},
+                                        {"\"rms_px\": 0.0421", "\"rms_px\": null", "/pose_quality/p2/rms_px"},
+                                        {"0.25,", "-0.25,", "/camera_covariances/0/covariance"},
+                                        {"0.25,", "0.001,", "/camera_covariances/0/covariance"},
+                                        {"\"camera\": 0", "\"camera\": 1", "/camera_covariances/0/camera"},
+                                        {"\"version\": 2", "\"version\": 3", "/version"}}) {
+    std::string wrong = text;
+    ASSERT_NE(wrong.find(from), std::string::npos) << from;
+    wrong.replace(wrong.find(from), std::string(from).size(), to);
+    write_file(folder / "c/cameras.json", wrong);
+    EXPECT_THAT(test::expect_error([&] { Capture::open(folder / "c"); }).message(), HasSubstr(place));
+  }
+  // A covariance beyond what can be read again never replaces the file.
+  write_file(folder / "c/cameras.json", text);
+  capture.camera_covariances[0](0, 0) = -1;
+  EXPECT_EQ(test::expect_error([&] { capture.save(); }).code(), ErrorCode::bad_input);
+  EXPECT_EQ(read_file(folder / "c/cameras.json"), text);
 }
 
 TEST(Capture, OptionsOfAnotherTypeAreAnError) {

@@ -90,14 +90,14 @@ TEST_F(CalibrateVerb, PlacesThePhotographsAndSaysHowWell) {
 
 TEST_F(CalibrateVerb, RunDoesItWhereTargetsAreNamed) {
   const std::string capture = import_photos();
-  // Nothing else can be made of photographs of a table: what matters is what is said of this stage.
-  const auto without = lumihull({"run", capture, "--quiet"});
+  // Nothing else can be made of photographs of a table: the next stage fails at once, for there is no enclosure.
+  const auto without = lumihull({"run", capture, "--background", "enclosure", "--quiet"});
   EXPECT_THAT(without.out, HasSubstr("no targets are named"));
   EXPECT_FALSE(Capture::open(capture).positioned(0));
-  const auto with = lumihull({"run", capture, "--targets", "aruco:6x6_250:35mm", "--quiet"});
+  const auto with = lumihull({"run", capture, "--targets", "aruco:6x6_250:35mm", "--background", "enclosure", "--quiet"});
   EXPECT_THAT(with.out, HasSubstr("8 of 8 photographs"));
   EXPECT_TRUE(Capture::open(capture).positioned(0));
-  const auto again = lumihull({"run", capture, "--quiet"});
+  const auto again = lumihull({"run", capture, "--background", "enclosure", "--quiet"});
   EXPECT_THAT(again.out, HasSubstr("calibrate  nothing has changed"));
 }
 
@@ -108,7 +108,7 @@ TEST_F(CalibrateVerb, ImportedPosesAreLeftAloneUnlessAskedForByName) {
   for (std::size_t i = 0; i < capture.shots.size(); ++i)
     capture.shots[i].cam_from_world = look_at({double(i), 1, 5}, {0, 0, 0}, {0, 0, 1});
   capture.save();
-  const auto run = lumihull({"run", folder, "--targets", "aruco:6x6_250:35mm", "--quiet"});
+  const auto run = lumihull({"run", folder, "--targets", "aruco:6x6_250:35mm", "--background", "enclosure", "--quiet"});
   EXPECT_THAT(run.out, HasSubstr("poses were imported"));
   EXPECT_EQ(Capture::open(folder).view(3).center(), capture.view(3).center());
   const auto asked = lumihull({"calibrate", folder, "--intrinsics", "fixed", "--quiet"});

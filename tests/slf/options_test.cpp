@@ -34,6 +34,21 @@ TEST(Options, PathsAreStoredAbsoluteAndWordsAsTheyAre) {
   EXPECT_EQ(stored<std::string>(capture, "evaluate", "reference_masks"), "");
 }
 
+TEST(Options, AWordForTargetsIsKeptAndAFileMadeAbsolute) {
+  const test::TemporaryFolder folder;
+  Capture capture = Capture::create(folder / "c");
+  set_option_text(capture, "calibrate", "targets", "aruco:6x6_250:35mm,matrix5x5:18mm");
+  EXPECT_EQ(stored<std::string>(capture, "calibrate", "targets"), "aruco:6x6_250:35mm,matrix5x5:18mm");
+  set_option_text(capture, "calibrate", "targets", "sheets.json");
+  EXPECT_EQ(stored<std::string>(capture, "calibrate", "targets"),
+            (std::filesystem::current_path() / "sheets.json").string());
+  set_option_text(capture, "calibrate", "intrinsics", "lens.json");
+  EXPECT_EQ(stored<std::string>(capture, "calibrate", "intrinsics"),
+            (std::filesystem::current_path() / "lens.json").string());
+  set_option_text(capture, "calibrate", "intrinsics", "fixed");
+  EXPECT_EQ(stored<std::string>(capture, "calibrate", "intrinsics"), "fixed");
+}
+
 TEST(Options, WhatDoesNotFitIsRefusedWithWhatWould) {
   const test::TemporaryFolder folder;
   Capture capture = Capture::create(folder / "c");

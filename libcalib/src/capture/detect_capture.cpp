@@ -92,8 +92,10 @@ CaptureDetections detect_capture(const Capture& capture, const TargetSet& set, c
       seen.detections.width = photo.width(), seen.detections.height = photo.height();
       seen.detections.found = detector.detect(photo, inner);
     }
-    write_file(file, internal::print_detections(set, seen));
-    out.photos[i].targets = std::move(seen.detections.found.targets);
+    const std::string text = internal::print_detections(set, seen);
+    write_file(file, text);
+    // As it will be read: a run that was stopped and one that was not must go on with the same digits.
+    out.photos[i].targets = internal::parse_detections(text, file.string(), set).detections.found.targets;
   };
 
   std::int64_t largest = 0;

@@ -43,12 +43,14 @@ std::pair<std::string, std::string> words_of(const Camera& camera) {
 }
 
 /// One command, its output into the log. counted: the number of things done so far that a line tells, if it does.
+/// forgiven: a failure with these words among its last is none.
 class Step {
  public:
   Step(const ColmapRun& run, Job& job, std::ofstream& log) : run_(run), job_(job), log_(log) {}
 
   void operator()(const std::string& stage, std::uint64_t total, std::vector<std::string> command,
-                  const std::function<std::optional<std::uint64_t>(const std::string&)>& counted) const {
+                  const std::function<std::optional<std::uint64_t>(const std::string&)>& counted,
+                  std::string_view forgiven = {}) const {
     command.insert(command.begin(), run_.program);
     std::deque<std::string> last;
     std::uint64_t done = 0;
@@ -72,9 +74,9 @@ class Step {
                   "colmap); photographs of printed targets need no other program: see `lumihull targets`",
                   run_.program);
     }
-    if (status != 0) {
-      std::string words;
-      for (const std::string& line : last) words += (words.empty() ? "" : " | ") + line;
+    std::string words;
+    for (const std::string& line : last) words += (words.empty() ? "" : " | ") + line;
+    if (status != 0 && (forgiven.empty() || words.find(forgiven) == std::string::npos)) {
       throw Error(ErrorCode::io,
                   "COLMAP's " + command[1] + " failed with status " + std::to_string(status) + ": " + words +
                       "; all of its words are in " + (run_.work / "colmap.log").string(),
@@ -147,9 +149,12 @@ fs::path ColmapRun::model(Job& job) const {
   if (known_camera)
     for (const char* flag : {"--Mapper.ba_refine_focal_length", "--Mapper.ba_refine_extra_params"})
       map.insert(map.end(), {flag, "0"});
-  step("placing photographs", photo_count, map, [](const std::string& line) -> std::optional<std::uint64_t> {
-    return line.find("Registering image #") == std::string::npos ? std::nullopt : number_behind(line, " (");
-  });
+  step(
+      "placing photographs", photo_count, map,
+      [](const std::string& line) -> std::optional<std::uint64_t> {
+        return line.find("Registering image #") == std::string::npos ? std::nullopt : number_behind(line, " (");
+      },
+      "failed to create sparse model");
 
   fs::path best;
   std::uint64_t most = 0;

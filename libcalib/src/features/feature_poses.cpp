@@ -208,6 +208,8 @@ FeatureReport poses_from_features(Capture& capture, const FeatureOptions& option
     report.said.push_back(report.scale ? "scale from " + std::to_string(targets) + " targets"
                                        : "warning: no target is seen from two sides: the scale stays unknown");
   }
+  if (!report.scale)
+    report.said.push_back("unit unknown: the distance of two photographs' cameras gives it (scale_distance)");
   if (report.scale) {
     stored.unit = Unit::metres;
     for (Shot& shot : stored.shots)

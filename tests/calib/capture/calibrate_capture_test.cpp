@@ -86,9 +86,12 @@ TEST_F(CalibrateCapture, PlacesEveryPhotographAndKeepsWhatItKnows) {
 TEST_F(CalibrateCapture, TheReportIsOnePageOnItsOwn) {
   Capture capture = imported();
   calibrate_capture(capture, options(), job_);
-  const std::string page = read_file(capture.folder() / "calibration.html");
+  std::string page = read_file(capture.folder() / "calibration.html");
   EXPECT_THAT(page, HasSubstr("</html>"));
-  EXPECT_THAT(page, HasSubstr("data:image/jpeg;base64,"));
+  const std::string picture = "data:image/jpeg;base64,";
+  EXPECT_THAT(page, HasSubstr(picture));
+  for (std::size_t at = 0; (at = page.find(picture, at)) != std::string::npos; at += picture.size())
+    page.erase(at + picture.size(), page.find('"', at) - at - picture.size());
   // Nothing is fetched: no address but the name of SVG's name space.
   const std::regex address("(href|src)=\"(?!data:)|url\\(|@import|https?://(?!www\\.w3\\.org/2000/svg)");
   std::smatch found;

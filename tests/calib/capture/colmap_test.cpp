@@ -173,18 +173,16 @@ TEST(Features, TempleIsPlacedWithAScale) {
   ImportOptions import;
   import.output = folder / "truth";
   const Capture truth = import_middlebury(temple / "templeSR_par.txt", import, job);
-  // Eight neighbours, their cameras known, their poses not.
-  Capture capture = truth;
-  capture.shots.resize(8);
+  Capture capture = truth;  // the camera known, its poses not
   for (Shot& shot : capture.shots) shot.cam_from_world.reset();
   FeatureOptions options;
   const double known = (truth.view(1).center() - truth.view(3).center()).norm();
   options.scale_distance = ScaleDistance{truth.shots[1].name, truth.shots[3].name, known};
   const FeatureReport report = poses_from_features(capture, options, job);
-  EXPECT_GE(report.placed, 6u);
+  EXPECT_GE(report.placed, 10u);
   EXPECT_EQ(capture.unit, Unit::metres);
   EXPECT_FALSE(fs::exists(capture.folder() / "features"));
-  for (std::size_t a = 0; a < 8; ++a)
+  for (std::size_t a = 0; a < truth.shots.size(); ++a)
     for (std::size_t b = 0; b < a; ++b) {
       if (!capture.positioned(a) || !capture.positioned(b)) continue;
       const double mine = (capture.view(a).center() - capture.view(b).center()).norm();

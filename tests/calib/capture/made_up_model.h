@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <type_traits>
 
 namespace lumihull::test {
 
@@ -15,10 +16,12 @@ inline calib::TargetModel made_up_model(int photos = 8, int targets = 4) {
   using namespace calib;
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;
-  const auto covariance = [&](auto zero, double sigma) {
-    decltype(zero) a = zero;
-    for (int i = 0; i < a.size(); ++i) a(i / a.cols(), i % a.cols()) = sigma * normal(random);
-    return decltype(zero)(a * a.transpose() + sigma * sigma * decltype(zero)::Identity());
+  const auto covariance = [&]<int N>(std::integral_constant<int, N>, double sigma) {
+    using Matrix = Eigen::Matrix<double, N, N>;
+    Matrix a = Matrix::Zero();
+    for (int i = 0; i < N * N; ++i) a(i / N, i % N) = sigma * normal(random);
+    const Matrix product = a * a.transpose() + sigma * sigma * Matrix::Identity();
+    return Matrix(0.5 * (product + product.transpose()));  // to the last digit
   };
   TargetModel model;
   model.set = TargetSet::from_word("matrix5x5:18mm");
@@ -50,7 +53,7 @@ inline calib::TargetModel made_up_model(int photos = 8, int targets = 4) {
       body.body.points.push_back({{place.x(), place.y(), 0}, design.circle_radius_m(), {0, 0, 1}});
       if (!body.placed) continue;
       body.points.push_back(body.body.point(std::size_t(k)));
-      body.point_covariances.push_back(covariance(Eigen::Matrix3d(), 2e-5));
+      body.point_covariances.push_back(covariance(std::integral_constant<int, 3>(), 2e-5));
     }
     c.bodies.push_back(std::move(body));
   }
@@ -61,7 +64,7 @@ inline calib::TargetModel made_up_model(int photos = 8, int targets = 4) {
     if (i != 2) {
       photo.cam_from_world = look_at({1.2 * std::cos(turn) * std::cos(up), 1.2 * std::sin(turn) * std::cos(up), 1.2 * std::sin(up)},
                                      {0, 0, 0}, {0, 0, 1});
-      photo.covariance = covariance(Eigen::Matrix<double, 6, 6>(), 4e-5);
+      photo.covariance = covariance(std::integral_constant<int, 6>(), 4e-5);
       photo.points = 60;
       photo.rms_px = 0.05 + 0.01 * (i % 4);
     }
