@@ -57,6 +57,11 @@ void check(const TargetSet& set, std::span<const PhotoTargets> photos, std::span
           invalid("a feature's pixel is not finite, or its covariance not positive", photo.name);
     }
   }
+  const std::vector<CalibratedBody> bodies = bodies_of(set, photos);
+  for (const ScaleBar& bar : options.bars)
+    if (bar.body_a >= bodies.size() || bar.body_b >= bodies.size() ||
+        bar.point_a >= bodies[bar.body_a].features.size() || bar.point_b >= bodies[bar.body_b].features.size())
+      invalid("there is no such body or point", "bars: " + bar.name);
 }
 
 /// How much of the cameras may be estimated from what is placed.
@@ -374,6 +379,7 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
   c.removed = std::move(n.removed);
   c.parts = parts;
   if (options.cross_validate) cross_validate(n, last, c, job);
+  check_bars(options.bars, c);
   judge_calibration(c, photos);
   return c;
 }

@@ -153,6 +153,21 @@ void name_unplaced_photos(Network& n, int part, std::vector<CalibratedPhoto>& ph
   }
 }
 
+void check_bars(const std::vector<ScaleBar>& bars, Calibration& c) {
+  for (const ScaleBar& bar : bars) {
+    const CalibratedBody &a = c.bodies[bar.body_a], &b = c.bodies[bar.body_b];
+    if (!a.placed || !b.placed) {
+      c.warnings.push_back("scale bar " + bar.name + ": " + (a.placed ? b.name : a.name) + " was not placed");
+      continue;
+    }
+    const double length = (a.points[bar.point_a] - b.points[bar.point_b]).norm();
+    if (std::abs(length - bar.length_m) > 3 * bar.sigma_m)
+      c.warnings.push_back("scale bar " + bar.name + formatted(": %.3f mm as given, %.3f mm as solved, %.1f standard "
+                           "deviations apart: it contradicts the targets' size or another bar", 1000 * bar.length_m,
+                           1000 * length, std::abs(length - bar.length_m) / bar.sigma_m));
+  }
+}
+
 void judge_calibration(Calibration& c, std::span<const PhotoTargets> photos) {
   std::size_t placed = 0, few = 0;
   for (const CalibratedPhoto& p : c.photos) placed += p.part == 0;

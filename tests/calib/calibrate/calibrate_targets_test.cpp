@@ -235,6 +235,66 @@ TEST(CalibrateTargets, TheRestIsPlacedByResection) {
   EXPECT_EQ(in_model, 40);
 }
 
+TEST(CalibrateTargets, TwoCamerasOnARigAreFoundToBe) {
+  SimulatedCapture capture = simulate_capture({});
+  Pose second;  // 120 mm beside the first, turned by 10 degrees
+  second.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(0.17, Eigen::Vector3d::UnitY()));
+  second.translation = {-0.12, 0.01, 0.02};
+  const std::size_t shots = capture.photos.size();
+  for (std::size_t i = 0; i < shots; ++i) {
+    PhotoTargets photo;
+    photo.name = capture.photos[i].name + "b";
+    photo.shot = int(i);
+    photo.camera = 1;
+    const Pose pose = second * capture.cam_from_world[i];
+    for (int id = 0; id < 40; ++id)
+      if (auto d = test::see_target(capture.set, id, capture.world_from_target[std::size_t(id)], {capture.camera, pose}, 0.05,
+                                    5000 + i * 100 + std::size_t(id)))
+        photo.targets.push_back(*d);
+    capture.photos.push_back(photo);
+    capture.cam_from_world.push_back(pose);
+  }
+  CalibrateOptions options;
+  options.rig = true;
+  options.refine_intrinsics = false;
+  std::vector<CameraStart> cameras = capture.cameras(true);
+  cameras.push_back(cameras[0]);
+  Job job;
+  const Calibration c = calibrate_targets(capture.set, capture.photos, cameras, options, job);
+  EXPECT_EQ(pose_errors(capture, c).photos, 120);
+  EXPECT_LT((c.cam_from_rig[1].translation - second.translation).norm(), 2e-4);
+  EXPECT_LT(c.cam_from_rig[1].rotation.angularDistance(second.rotation), 5e-5);
+  // Fixed to each other exactly.
+  for (std::size_t i = 0; i < shots; ++i) {
+    const Pose relative = *c.photos[shots + i].cam_from_world * c.photos[i].cam_from_world->inverse();
+    EXPECT_LT((relative.translation - c.cam_from_rig[1].translation).norm(), 1e-9);
+  }
+}
+
+TEST(CalibrateTargets, BarsThatContradictAreNamed) {
+  SimulatedOptions o;
+  o.photos = 30;
+  const SimulatedCapture capture = simulate_capture(o);
+  const auto bar = [&](const char* name, unsigned a, unsigned b, double stretch) {
+    const Eigen::Vector2d first = capture.set.designs[0].feature(0);
+    const Eigen::Vector3d place(first.x(), first.y(), 0);
+    const double length = (capture.world_from_target[a] * place - capture.world_from_target[b] * place).norm();
+    return ScaleBar{name, a, 0, b, 0, stretch * length, 1e-4};
+  };
+  CalibrateOptions options;
+  options.bars = {bar("one", 2, 8, 1.01), bar("two", 4, 10, 1.01)};  // printed 1 % too large: both bars say so
+  options.free_print_scale = true;
+  const Calibration c = calibrate(capture, true, options);
+  EXPECT_NEAR(c.print_scale.x(), 1.01, 5e-4);
+  EXPECT_NEAR(c.print_scale.y(), 1.01, 5e-4);
+  EXPECT_TRUE(std::none_of(c.warnings.begin(), c.warnings.end(), [](const auto& w) { return w.find("bar") != w.npos; }));
+  options.bars[1].length_m *= 1.02;
+  const Calibration torn = calibrate(capture, true, options);
+  EXPECT_THAT(torn.warnings, testing::Contains(HasSubstr("scale bar two")));
+  options.bars[1].body_b = 900;
+  EXPECT_THROW(calibrate(capture, true, options), Error);
+}
+
 TEST(CalibrateTargets, FaultsAreClear) {
   SimulatedOptions o;
   o.photos = 6;
