@@ -6,6 +6,7 @@
 #include <lumihull/calib/target_tracks.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
@@ -254,17 +255,26 @@ TEST(Features, TempleIsPlaced) {
   const FeatureReport report = poses_from_features(capture, {}, job);
   EXPECT_GE(report.placed, 8u);
   EXPECT_EQ(capture.unit, Unit::unknown);
+  // What COLMAP makes of it is COLMAP's: most distances between cameras agree up to the scale, which is what a wrong
+  // order, a transform the other way round or another camera's pose would not leave.
+  std::vector<std::pair<double, double>> lengths;
   std::vector<double> ratios;
+  double longest = 0;
   for (std::size_t a = 0; a < truth.shots.size(); ++a)
-    for (std::size_t b = 0; b < a; ++b)
-      if (capture.positioned(a) && capture.positioned(b))
-        ratios.push_back((capture.view(a).center() - capture.view(b).center()).norm() /
-                         (truth.view(a).center() - truth.view(b).center()).norm());
-  std::sort(ratios.begin(), ratios.end());
+    for (std::size_t b = 0; b < a; ++b) {
+      if (!capture.positioned(a) || !capture.positioned(b)) continue;
+      lengths.emplace_back((capture.view(a).center() - capture.view(b).center()).norm(),
+                           (truth.view(a).center() - truth.view(b).center()).norm());
+      ratios.push_back(lengths.back().first / lengths.back().second);
+      longest = std::max(longest, lengths.back().second);
+    }
   ASSERT_FALSE(ratios.empty());
+  std::nth_element(ratios.begin(), ratios.begin() + std::ptrdiff_t(ratios.size() / 2), ratios.end());
   const double scale = ratios[ratios.size() / 2];
-  EXPECT_GT(ratios.front(), 0.9 * scale);
-  EXPECT_LT(ratios.back(), 1.1 * scale);
+  const auto near = std::count_if(lengths.begin(), lengths.end(), [&](const auto& l) {
+    return std::abs(l.first / scale - l.second) < 0.05 * longest;
+  });
+  EXPECT_GT(double(near), 0.7 * double(lengths.size()));
 }
 
 }  // namespace
