@@ -111,7 +111,8 @@ TEST_F(CalibrateVerb, ImportedPosesAreLeftAloneUnlessAskedForByName) {
   const auto run = lumihull({"run", folder, "--targets", "aruco:6x6_250:35mm", "--background", "enclosure", "--quiet"});
   EXPECT_THAT(run.out, HasSubstr("poses were imported"));
   EXPECT_EQ(Capture::open(folder).view(3).center(), capture.view(3).center());
-  const auto asked = lumihull({"calibrate", folder, "--intrinsics", "fixed", "--quiet"});
+  const auto asked = lumihull(
+      {"calibrate", folder, "--targets", "aruco:6x6_250:35mm", "--intrinsics", "fixed", "--quiet"});
   EXPECT_EQ(asked.status, 0) << asked.err;
   const Capture stored = Capture::open(folder);
   EXPECT_NE(stored.view(3).center(), capture.view(3).center());
