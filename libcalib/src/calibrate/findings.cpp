@@ -162,9 +162,11 @@ void check_bars(const std::vector<ScaleBar>& bars, Calibration& c) {
     }
     const double length = (a.points[bar.point_a] - b.points[bar.point_b]).norm();
     if (std::abs(length - bar.length_m) > 3 * bar.sigma_m)
-      c.warnings.push_back("scale bar " + bar.name + formatted(": %.3f mm as given, %.3f mm as solved, %.1f standard "
-                           "deviations apart: it contradicts the targets' size or another bar", 1000 * bar.length_m,
-                           1000 * length, std::abs(length - bar.length_m) / bar.sigma_m));
+      c.warnings.push_back("scale bar " + bar.name +
+                           formatted(": %.3f mm as given, %.3f mm as solved, %.1f standard "
+                                     "deviations apart: it contradicts the targets' size or another bar",
+                                     1000 * bar.length_m, 1000 * length,
+                                     std::abs(length - bar.length_m) / bar.sigma_m));
   }
 }
 

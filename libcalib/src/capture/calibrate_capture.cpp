@@ -70,8 +70,8 @@ CalibrateCaptureReport calibrate_capture(Capture& capture, const CalibrateCaptur
   for (const PhotoTargets& photo : seen.photos) report.found += photo.targets.size();
   if (report.found == 0)
     throw Error(ErrorCode::degenerate,
-                "none of the " + std::to_string(capture.shots.size()) +
-                    " photographs shows a target of \"" + options.targets +
+                "none of the " + std::to_string(capture.shots.size()) + " photographs shows a target of \"" +
+                    options.targets +
                     "\": is that what was printed, in focus and not too small? `lumihull detect PHOTO --targets … "
                     "--draw FOLDER` shows what is seen",
                 capture.folder().string());

@@ -26,7 +26,8 @@ constexpr const char* kStyle =
     ".verdict{font-size:1.15em;border-left:4px solid #2c9c5a;padding-left:.8em}.dim{color:#777;font-size:.9em}"
     ".problem{border-left:4px solid #d9622b;padding-left:.8em}.scroll{overflow-x:auto}summary{cursor:pointer}"
     "h2{margin:1.6em 0 .4em}figure{margin:1em 0}figcaption{font-size:.85em}svg.scene{touch-action:none}"
-    ".turns{cursor:grab}svg.scene polyline{fill:none;stroke-width:1}svg .camera{stroke:#3b78d8}svg .later{stroke:#8a8f98}"
+    ".turns{cursor:grab}svg.scene polyline{fill:none;stroke-width:1}svg .camera{stroke:#3b78d8}svg "
+    ".later{stroke:#8a8f98}"
     "svg .target{stroke:#2c9c5a}svg .dot{fill:#2c9c5a}svg .sigma{stroke:#d9622b;stroke-opacity:.6}"
     "svg text.name{font-size:10px;text-anchor:middle;paint-order:stroke;stroke:#fff;stroke-width:2px}"
     ".residual{stroke:#ff28c8;stroke-width:1.2}.seen{fill:#28e650}.onmapline{stroke:#fff;stroke-width:1.2}"
@@ -38,8 +39,7 @@ std::string row(const std::string& name, const std::string& value) {
 
 std::string cells(const std::vector<std::string>& values, const char* tag = "td") {
   std::string out = "<tr>";
-  for (const std::string& value : values)
-    out += std::string("<") + tag + ">" + html_escaped(value) + "</" + tag + ">";
+  for (const std::string& value : values) out += std::string("<") + tag + ">" + html_escaped(value) + "</" + tag + ">";
   return out + "</tr>\n";
 }
 
@@ -80,7 +80,8 @@ std::string figures(const TargetModel& model) {
   }
   const auto of = [](std::size_t part, std::size_t all) { return std::to_string(part) + " of " + std::to_string(all); };
   std::string out = "<table>\n";
-  out += row("photographs with a pose", of(placed, c.photos.size()) + ", the model made from " + std::to_string(in_model));
+  out +=
+      row("photographs with a pose", of(placed, c.photos.size()) + ", the model made from " + std::to_string(in_model));
   out += row("targets or boards placed", of(targets, c.bodies.size()));
   out += row("points that count", std::to_string(points) + ", " + number("%.1f", 100 * c.share) + " % of those seen");
   out += row("RMS residual", number("%.4f", c.rms_px) + " px");
@@ -91,20 +92,21 @@ std::string figures(const TargetModel& model) {
                                             number("%.2f", c.cross_validation_sigma) + " of what is expected");
   if (!centers.empty()) {
     out += row("camera centres, one standard deviation", "median " + length(median(centers)) + ", largest " +
-                                                  length(*std::max_element(centers.begin(), centers.end())));
-    out += row("camera directions, one standard deviation", "median " + number("%.2g", median(rotations)) + "°, largest " +
-                                               number("%.2g", *std::max_element(rotations.begin(), rotations.end())) +
-                                               "°");
+                                                             length(*std::max_element(centers.begin(), centers.end())));
+    out += row("camera directions, one standard deviation",
+               "median " + number("%.2g", median(rotations)) + "°, largest " +
+                   number("%.2g", *std::max_element(rotations.begin(), rotations.end())) + "°");
   }
   if (!places.empty())
     out += row("targets' points, one standard deviation", "median " + length(median(places)) + ", largest " +
-                                             length(*std::max_element(places.begin(), places.end())));
+                                                              length(*std::max_element(places.begin(), places.end())));
   out += row("departure from flat or as printed", length(c.bend_m));
   if (c.print_scale != Eigen::Vector2d(1, 1))
     out += row("size of the print", number("%.5f", c.print_scale.x()) + " x " + number("%.5f", c.print_scale.y()));
   if (c.parts > 1) out += row("parts that share no target", std::to_string(c.parts));
-  return out + "</table>\n<p class=\"dim\">Standard deviations are along the longest axis, against the targets' points "
-               "as a whole (inner constraints).</p>\n";
+  return out +
+         "</table>\n<p class=\"dim\">Standard deviations are along the longest axis, against the targets' points "
+         "as a whole (inner constraints).</p>\n";
 }
 
 std::string intrinsics(const Calibration& c) {

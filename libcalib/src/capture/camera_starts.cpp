@@ -36,8 +36,8 @@ std::vector<CameraStart> camera_starts(const Capture& capture, const std::filesy
   for (std::size_t i = 0; i < capture.cameras.size(); ++i) {
     const Camera& camera = capture.cameras[i];
     CameraStart start{camera.width, camera.height, std::nullopt, 0};
-    const auto shot = std::find_if(capture.shots.begin(), capture.shots.end(),
-                                   [&](const Shot& s) { return s.camera == int(i); });
+    const auto shot =
+        std::find_if(capture.shots.begin(), capture.shots.end(), [&](const Shot& s) { return s.camera == int(i); });
     if (given && given->width == camera.width && given->height == camera.height) {
       start.camera = given;
       used = true;

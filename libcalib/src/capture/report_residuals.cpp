@@ -70,7 +70,8 @@ std::string coverage(const TargetModel& model, std::size_t camera) {
   figure.axes(0, k.width, k.height, 0, "u, px", "v, px");
   for (int i = 0; i < cells.count(); ++i) {
     const std::size_t count = n[std::size_t(i)];
-    cells.paint(figure, i, count == 0 ? kUnseen : lens::map_color(std::log1p(double(count)) / std::log1p(double(most))));
+    cells.paint(figure, i,
+                count == 0 ? kUnseen : lens::map_color(std::log1p(double(count)) / std::log1p(double(most))));
   }
   return figure.str();
 }
@@ -170,8 +171,8 @@ std::string drawn(const Capture& capture, const TargetModel& model, std::size_t 
   const double scale = small.width() / full_width, high = full_height * scale;
   const double times = lens::magnification(c.photos[photo].rms_px, 12 / scale);
   const std::string w = std::to_string(small.width()), h = std::to_string(small.height());
-  std::string out = "<figure><svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + w + " " + h + "\" width=\"" + w +
-                    "\" height=\"" + h + "\" role=\"img\"><image width=\"" + w + "\" height=\"" + h +
+  std::string out = "<figure><svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + w + " " + h + "\" width=\"" +
+                    w + "\" height=\"" + h + "\" role=\"img\"><image width=\"" + w + "\" height=\"" + h +
                     "\" href=\"data:image/jpeg;base64," + lumihull::internal::base64(encode_jpeg(small, 80)) + "\"/>\n";
   for (const CalibrationResidual& r : c.residuals) {
     if (std::size_t(r.photo) != photo) continue;
@@ -181,8 +182,8 @@ std::string drawn(const Capture& capture, const TargetModel& model, std::size_t 
     const std::string style = r.removed ? "wrong" : "residual";
     out += "<line class=\"" + style + "\" x1=\"" + number("%.1f", from.x()) + "\" y1=\"" + number("%.1f", from.y()) +
            "\" x2=\"" + number("%.1f", from.x() + arrow.x()) + "\" y2=\"" + number("%.1f", from.y() + arrow.y()) +
-           "\"/><circle r=\"1.5\" class=\"" + (r.removed ? "outlier" : "seen") + "\" cx=\"" +
-           number("%.1f", from.x()) + "\" cy=\"" + number("%.1f", from.y()) + "\"/>\n";
+           "\"/><circle r=\"1.5\" class=\"" + (r.removed ? "outlier" : "seen") + "\" cx=\"" + number("%.1f", from.x()) +
+           "\" cy=\"" + number("%.1f", from.y()) + "\"/>\n";
   }
   return out + "</svg><figcaption>" + html_escaped(model.photos[photo].name) + ": RMS " +
          number("%.4f", c.photos[photo].rms_px) + " px, " + std::to_string(c.photos[photo].points) +
@@ -197,7 +198,8 @@ std::string over_the_picture(const TargetModel& model) {
   const std::size_t n = model.calibration.cameras.size();
   for (std::size_t i = 0; i < std::min(n, kMostCameras); ++i) out += coverage(model, i) + residual_map(model, i);
   if (n > kMostCameras)
-    out += "<p class=\"dim\">The first " + std::to_string(kMostCameras) + " of " + std::to_string(n) + " cameras.</p>\n";
+    out +=
+        "<p class=\"dim\">The first " + std::to_string(kMostCameras) + " of " + std::to_string(n) + " cameras.</p>\n";
   return out;
 }
 

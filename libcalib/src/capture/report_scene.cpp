@@ -97,8 +97,7 @@ std::vector<Vector3d> frustum(const Camera& camera, const Pose& cam_from_world, 
     corner[std::size_t(i)] = world_from_cam * (length * Vector3d(d.x(), d.y(), 1));
   }
   const Vector3d apex = cam_from_world.center();
-  return {corner[0], apex,      corner[1], corner[0], corner[3], apex,
-          corner[2], corner[1], corner[2], corner[3]};
+  return {corner[0], apex, corner[1], corner[0], corner[3], apex, corner[2], corner[1], corner[2], corner[3]};
 }
 
 /// Outlines of the targets of a body: the four outer points of each.
@@ -109,8 +108,9 @@ void add_outlines(const TargetSet& set, const CalibratedBody& body, const Frame&
   for (const auto& [target, points] : targets) {
     const TargetDesign& design = set.designs.at(std::size_t(target.first));
     const int n = design.family.kind() == TargetKind::circles ? design.family.grid() : 2;
-    const std::array<int, 4> corners = n == 2 && design.features() == 4 ? std::array<int, 4>{0, 1, 2, 3}
-                                                                        : std::array<int, 4>{0, n - 1, n * n - 1, n * n - n};
+    const std::array<int, 4> corners = n == 2 && design.features() == 4
+                                           ? std::array<int, 4>{0, 1, 2, 3}
+                                           : std::array<int, 4>{0, n - 1, n * n - 1, n * n - n};
     Shape outline{"target", {}, ""};
     for (const int k : {corners[0], corners[1], corners[2], corners[3], corners[0]})
       if (const auto at = points.find(k); at != points.end()) outline.points.push_back(frame(at->second));
@@ -170,8 +170,8 @@ std::string svg(const std::vector<Shape>& shapes, int width, int height, double 
       std::snprintf(text, sizeof text, "%s%.0f %.0f %.0f", data.empty() ? "" : " ", p.x(), p.y(), p.z());
       data += text;
     }
-    const std::string tail = " class=\"" + std::string(shape.style) + "\"" +
-                             (turns ? " data-p=\"" + data + "\"" : std::string());
+    const std::string tail =
+        " class=\"" + std::string(shape.style) + "\"" + (turns ? " data-p=\"" + data + "\"" : std::string());
     const std::size_t comma = points.find(',');
     if (!shape.text.empty())
       out += "<text" + tail + " x=\"" + points.substr(0, comma) + "\" y=\"" + points.substr(comma + 1) + "\">" +
@@ -235,7 +235,8 @@ std::string scene(const TargetModel& model) {
     add_ellipsoid(middle_of(*bodies[i]), body_covariances[i], times, frame, shapes);
   constexpr std::size_t kMostNames = 60;
   if (bodies.size() <= kMostNames)
-    for (const CalibratedBody* b : bodies) shapes.push_back({"name", {frame(middle_of(*b))}, b->id >= 0 ? std::to_string(b->id) : b->name});
+    for (const CalibratedBody* b : bodies)
+      shapes.push_back({"name", {frame(middle_of(*b))}, b->id >= 0 ? std::to_string(b->id) : b->name});
 
   return "<p class=\"dim\">Blue: photographs that the model was made from; grey: placed afterwards; green: targets. "
          "Orange: one standard deviation, " +

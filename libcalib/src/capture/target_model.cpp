@@ -57,9 +57,8 @@ TargetModel TargetModel::of(const Capture& capture) {
   c.cameras = capture.cameras;
   for (std::size_t i = 0; i < capture.cameras.size(); ++i) {
     const auto at = capture.camera_covariances.find(int(i));
-    c.camera_covariances.push_back(at == capture.camera_covariances.end()
-                                       ? Eigen::Matrix<double, kIntrinsics, kIntrinsics>::Zero()
-                                       : at->second);
+    c.camera_covariances.push_back(
+        at == capture.camera_covariances.end() ? Eigen::Matrix<double, kIntrinsics, kIntrinsics>::Zero() : at->second);
   }
   std::map<std::string_view, const Shot*> shots;
   for (const Shot& shot : capture.shots) shots[shot.name] = &shot;
@@ -89,9 +88,8 @@ std::string calibration_json(const TargetModel& model) {
     one["text"] = r.text;
     removed.push_back(std::move(one));
   }
-  Json json{{"photos", c.photos.size()}, {"photos_placed", placed}, {"targets", targets},
-            {"rms_px", c.rms_px},        {"share", c.share},        {"sigma0", c.sigma0},
-            {"cross_validation", nullptr}};
+  Json json{{"photos", c.photos.size()}, {"photos_placed", placed}, {"targets", targets},         {"rms_px", c.rms_px},
+            {"share", c.share},          {"sigma0", c.sigma0},      {"cross_validation", nullptr}};
   if (c.cross_validation_m >= 0)
     json["cross_validation"] = {{"distance_m", c.cross_validation_m}, {"sigma", c.cross_validation_sigma}};
   json["intrinsics"] = std::move(intrinsics);

@@ -51,7 +51,8 @@ Json list(const Vector& v) {
   return json;
 }
 
-// ---- bodies ----------------------------------------------------------------------------------------------------------
+// ---- bodies
+// ----------------------------------------------------------------------------------------------------------
 
 Json print_point(const CalibratedBody& body, std::size_t k) {
   const BodyPoint& printed = body.body.points.at(k);
@@ -105,9 +106,8 @@ void read_point(const JsonReader& json, const TargetSet& set, CalibratedBody& bo
   }
   if (!body.placed) return;
   body.points.push_back(read_vector<3>(json.at("point")));
-  body.point_covariances.push_back(json.has("covariance")
-                                       ? lumihull::internal::read_covariance<3>(json.at("covariance"))
-                                       : Eigen::Matrix3d::Zero());
+  body.point_covariances.push_back(
+      json.has("covariance") ? lumihull::internal::read_covariance<3>(json.at("covariance")) : Eigen::Matrix3d::Zero());
 }
 
 CalibratedBody read_body(const JsonReader& json, const TargetSet& set) {
@@ -130,7 +130,8 @@ CalibratedBody read_body(const JsonReader& json, const TargetSet& set) {
   return b;
 }
 
-// ---- what was known before, photographs, what was left out -----------------------------------------------------------
+// ---- what was known before, photographs, what was left out
+// -----------------------------------------------------------
 
 Json print_start(const CameraStart& s) {
   Json json{{"width", s.width}, {"height", s.height}};
@@ -149,8 +150,8 @@ CameraStart read_start(const JsonReader& json) {
 }
 
 Json print_photo(const TargetModel::Photo& photo, const CalibratedPhoto& p) {
-  return {{"name", photo.name}, {"camera", photo.camera}, {"in_model", p.in_model}, {"part", p.part}, {"points", p.points},
-          {"rms_px", p.rms_px}, {"reason", p.reason}};
+  return {{"name", photo.name}, {"camera", photo.camera}, {"in_model", p.in_model}, {"part", p.part},
+          {"points", p.points}, {"rms_px", p.rms_px},     {"reason", p.reason}};
 }
 
 CalibratedPhoto read_photo(const JsonReader& json) {
@@ -220,8 +221,8 @@ TargetModel parse_target_model(std::string_view text, const std::string& name) {
   model.set = read_target_set(top.at("set"));
   model.starts = read_list(top, "starts", read_start);
   c.photos = read_list(top, "photos", [&](const JsonReader& json) {
-    model.photos.push_back({json.at("name").string(),
-                            int(json.at("camera").integer(0, std::int64_t(model.starts.size()) - 1))});
+    model.photos.push_back(
+        {json.at("name").string(), int(json.at("camera").integer(0, std::int64_t(model.starts.size()) - 1))});
     return read_photo(json);
   });
   std::map<std::string, int> photo_of;
@@ -250,13 +251,12 @@ std::string print_target_model(const TargetModel& model, const std::string& name
   const Calibration& c = model.calibration;
   Json starts = Json::array(), photos = Json::array(), bodies = Json::array(), removed = Json::array();
   for (const CameraStart& s : model.starts) starts.push_back(print_start(s));
-  for (std::size_t i = 0; i < model.photos.size(); ++i)
-    photos.push_back(print_photo(model.photos[i], c.photos.at(i)));
+  for (std::size_t i = 0; i < model.photos.size(); ++i) photos.push_back(print_photo(model.photos[i], c.photos.at(i)));
   for (const CalibratedBody& b : c.bodies) bodies.push_back(print_body(b));
   for (const Removed& r : c.removed) removed.push_back(print_removed(r, model.photos));
-  Json json{{"format", kFormat},       {"version", kVersion},        {"verdict", c.verdict},
-            {"rms_px", c.rms_px},      {"share", c.share},           {"sigma0", c.sigma0},
-            {"parts", c.parts},        {"print_scale", list(c.print_scale)}, {"bend_m", c.bend_m}};
+  Json json{{"format", kFormat}, {"version", kVersion}, {"verdict", c.verdict}, {"rms_px", c.rms_px},
+            {"share", c.share},  {"sigma0", c.sigma0},  {"parts", c.parts},     {"print_scale", list(c.print_scale)},
+            {"bend_m", c.bend_m}};
   if (c.cross_validation_m >= 0)
     json["cross_validation"] = {{"distance_m", c.cross_validation_m}, {"sigma", c.cross_validation_sigma}};
   json["warnings"] = c.warnings;

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <map>
+#include <optional>
 #include <system_error>
 
 namespace lumihull::calib {
@@ -16,29 +18,24 @@ struct Place {
   std::size_t body = 0, point = 0, track = 0;
 };
 
-/// What calibration left out, by photograph: those that concern all photographs are in each list.
+/// Observations and detections that calibration left out, by photograph.
 class LeftOut {
  public:
   explicit LeftOut(const TargetModel& model) : by_photo_(model.photos.size()) {
-    for (const Removed& r : model.calibration.removed) {
-      if (r.photo >= 0)
+    for (const Removed& r : model.calibration.removed)
+      if (r.kind == Removed::Kind::observation || r.kind == Removed::Kind::detection)
         by_photo_.at(std::size_t(r.photo)).push_back(&r);
-      else
-        everywhere_.push_back(&r);
-    }
   }
   bool has(std::size_t photo, int body, const Detection& target, int feature) const {
     const auto names = [&](const Removed* r) {
       return (r->body < 0 || r->body == body) && (r->design < 0 || r->design == target.design) &&
              (r->id < 0 || r->id == target.id) && (r->feature < 0 || r->feature == feature);
     };
-    return std::any_of(by_photo_[photo].begin(), by_photo_[photo].end(), names) ||
-           std::any_of(everywhere_.begin(), everywhere_.end(), names);
+    return std::any_of(by_photo_[photo].begin(), by_photo_[photo].end(), names);
   }
 
  private:
   std::vector<std::vector<const Removed*>> by_photo_;
-  std::vector<const Removed*> everywhere_;
 };
 
 /// Where the circle's centre is seen, from where its ellipse's centre was measured.
@@ -48,8 +45,7 @@ std::optional<Eigen::Vector2d> pixel_of_center(const View& view, const Calibrate
   if (!(printed.radius > 0)) return measured;
   Circle3 circle;
   circle.center = view.cam_from_world * body.points[point];
-  const Eigen::Vector3d normal =
-      view.cam_from_world.rotation * (body.body.world_from_body.rotation * printed.normal);
+  const Eigen::Vector3d normal = view.cam_from_world.rotation * (body.body.world_from_body.rotation * printed.normal);
   circle.u = normal.unitOrthogonal();
   circle.v = normal.cross(circle.u);
   circle.radius = printed.radius;
@@ -66,14 +62,14 @@ std::vector<Track> target_tracks(const Capture& capture) {
   const TargetModel model = TargetModel::of(capture);
   const Calibration& c = model.calibration;
   std::vector<Track> tracks;
-  std::map<std::array<int, 3>, Place> places;  // by design, id, feature
+  std::map<std::array<int, 3>, std::vector<Place>> places;  // by design, id, feature; two where a target was moved
   for (std::size_t b = 0; b < c.bodies.size(); ++b) {
     const CalibratedBody& body = c.bodies[b];
     if (!body.placed) continue;
     for (std::size_t k = 0; k < body.points.size(); ++k) {
       const auto& name = body.features[k];
-      if (places.emplace(std::array{name.design, name.id, name.feature}, Place{b, k, tracks.size()}).second)
-        tracks.push_back({body.points[k], {}});
+      places[{name.design, name.id, name.feature}].push_back({b, k, tracks.size()});
+      tracks.push_back({body.points[k], {}});
     }
   }
   const LeftOut left_out(model);
@@ -87,9 +83,17 @@ std::vector<Track> target_tracks(const Capture& capture) {
     for (const Detection& target : seen.photos[shot].targets)
       for (const Feature& feature : target.features) {
         const auto at = places.find({target.design, target.id, feature.index});
-        if (at == places.end() || left_out.has(photo->second, int(at->second.body), target, feature.index)) continue;
-        if (const auto pixel = pixel_of_center(view, c.bodies[at->second.body], at->second.point, feature.pixel))
-          tracks[at->second.track].sights.push_back({shot, *pixel});
+        if (at == places.end()) continue;
+        const auto distance = [&](const Place& p) {
+          const auto pixel = view.project(c.bodies[p.body].points[p.point]);
+          return pixel ? (*pixel - feature.pixel).squaredNorm() : std::numeric_limits<double>::infinity();
+        };
+        const Place& place =
+            *std::min_element(at->second.begin(), at->second.end(),
+                              [&](const Place& p, const Place& q) { return distance(p) < distance(q); });
+        if (left_out.has(photo->second, int(place.body), target, feature.index)) continue;
+        if (const auto pixel = pixel_of_center(view, c.bodies[place.body], place.point, feature.pixel))
+          tracks[place.track].sights.push_back({shot, *pixel});
       }
   }
   std::erase_if(tracks, [](const Track& track) { return track.sights.size() < 2; });

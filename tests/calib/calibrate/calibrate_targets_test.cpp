@@ -248,8 +248,8 @@ TEST(CalibrateTargets, TwoCamerasOnARigAreFoundToBe) {
     photo.camera = 1;
     const Pose pose = second * capture.cam_from_world[i];
     for (int id = 0; id < 40; ++id)
-      if (auto d = test::see_target(capture.set, id, capture.world_from_target[std::size_t(id)], {capture.camera, pose}, 0.05,
-                                    5000 + i * 100 + std::size_t(id)))
+      if (auto d = test::see_target(capture.set, id, capture.world_from_target[std::size_t(id)], {capture.camera, pose},
+                                    0.05, 5000 + i * 100 + std::size_t(id)))
         photo.targets.push_back(*d);
     capture.photos.push_back(photo);
     capture.cam_from_world.push_back(pose);
@@ -287,7 +287,8 @@ TEST(CalibrateTargets, BarsThatContradictAreNamed) {
   const Calibration c = calibrate(capture, true, options);
   EXPECT_NEAR(c.print_scale.x(), 1.01, 5e-4);
   EXPECT_NEAR(c.print_scale.y(), 1.01, 5e-4);
-  EXPECT_TRUE(std::none_of(c.warnings.begin(), c.warnings.end(), [](const auto& w) { return w.find("bar") != w.npos; }));
+  EXPECT_TRUE(
+      std::none_of(c.warnings.begin(), c.warnings.end(), [](const auto& w) { return w.find("bar") != w.npos; }));
   options.bars[1].length_m *= 1.02;
   const Calibration torn = calibrate(capture, true, options);
   EXPECT_THAT(torn.warnings, testing::Contains(HasSubstr("scale bar two")));

@@ -14,8 +14,7 @@ namespace lumihull::calib {
 namespace {
 
 TEST(CalibrateReal, CaseFromNothing) {
-  const std::filesystem::path folder = test::data_folder("case");
-  if (folder.empty()) GTEST_SKIP() << "the photographs of the red case are not there (LUMIHULL_TEST_DATA)";
+  LUMIHULL_NEED_REAL_DATA(folder, "case");
   Job job;
   const TargetDetector detector(TargetSet::from_word("aruco:6x6_250:35mm"));
   std::vector<PhotoTargets> photos(22);
