@@ -21,6 +21,10 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+/// How far a cell of a code without check bits may be from what a disc or a ring shows, as a share of the difference:
+/// what hides a part of one may make it look like the other.
+constexpr double kWorstUnchecked = 0.28;
+
 CircleLook look_of(const TargetDesign& design) {
   return {design.ring_radius_m() / design.circle_radius_m(), design.solid_light};
 }
@@ -408,7 +412,8 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   if (!(target.rms_px < (checked ? 0.035 : 0.02) * pitch_px + 0.1)) return refuse(RefusedTarget::Reason::homography);
   if (!checked && !(features.size() * 4 >= 3 * n && all_in_place(h, features)))
     return refuse(RefusedTarget::Reason::too_few_features);
-  if (!checked && reading.dark_spread > 0.15) return refuse(RefusedTarget::Reason::no_code);
+  if (!checked && (reading.dark_spread > 0.15 || reading.worst > kWorstUnchecked))
+    return refuse(RefusedTarget::Reason::no_code);
   target.pixel_from_target = h / h.norm();
   target.features = std::move(features);
   result.found = true;

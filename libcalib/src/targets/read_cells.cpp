@@ -170,6 +170,8 @@ CellReading read_cells(const LightPlane& plane, std::span<const Ellipse> circles
     const double zone = 0.15 * apart;
     if (x > middle + zone && x < 1 + 0.5 * apart + 4 * noise) reading.cells[i] = Cell::dark;
     if (x < middle - zone && (look.solid_light || x > light - 0.6 * apart - 4 * noise)) reading.cells[i] = Cell::light;
+    if (reading.cells[i] != Cell::unknown)
+      reading.worst = std::max(reading.worst, std::abs(x - (reading.cells[i] == Cell::dark ? 1 : light)) / apart);
   }
   double sum = 0, squares = 0;
   int count = 0;

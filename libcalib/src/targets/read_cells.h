@@ -22,6 +22,7 @@ struct CellReading {
       0;               ///< expected difference between a dark and a light centre, of the paper's light; 0: unreadable
   double blur_px = 0;  ///< sigma that was assumed
   double dark_spread = 0;  ///< standard deviation of dark circles' centres / the ink's contrast
+  double worst = 0;        ///< largest |x - expected| of a cell that was read, over the difference of disc and ring
   double contrast = 0;     ///< of dark circles' centres, of the paper's light
 };
 
