@@ -17,7 +17,9 @@ constexpr double kLightChange = 1e-4;
 constexpr double kRatioSd = 0.03;    // of a ring's ratio, a priori: ink spreads
 constexpr double kLeastRaise = 1.2;  // of the noise: less may be chance
 constexpr float kOnSlope = 0.25f;    // of the steepest slope
-constexpr int kFlush = 32;           // blocks that are summed in float
+constexpr double kLongest =
+    6;  // sum of an answer's semi-axes, over the longer one of the ellipse that pixels were gathered about
+constexpr int kFlush = 32;  // blocks that are summed in float
 // Times s, what CurvedEdge is used for: the pixels see not much beyond the centres of curvature.
 constexpr double kMostCurvature = 0.32, kMostInnerCurvature = 0.45;
 constexpr double kFastestRate = 0.02;    // of convergence that is believed: what is ill determined comes late
@@ -33,6 +35,7 @@ void ContourFit::gather(const Ellipse& ellipse, const ContourModel& model, const
                         double inner_ratio) {
   blocks_.clear();
   sectors_.assign(std::size_t(sectors), {});
+  longest_ = ellipse.a;
   gathered_ = 0;
   inner_ratio_ = inner_ratio;
   const double s = model.p[ContourModel::blur], ratio = inner_ratio > 0 ? model.p[ContourModel::ratio] : 1;
@@ -184,8 +187,8 @@ void ContourFit::weigh() {
     for (int i = 0; i < kLanes; ++i) {
       const double v = double(block.expected[i]), jitter = jitter_px_ * double(block.slope[i]);
       const double variance = std::max(1e-14, scale * plane_.noise.variance(v)) + jitter * jitter;
-      // By the model, not only by the value: to leave out those that noise has lifted would pull the level down. What is
-      // far below the limit is not clipped, whatever the model says: else it could explain all by light beyond it.
+      // By the model, not only by the value: to leave out those that noise has lifted would pull the level down. What
+      // is far below the limit is not clipped, whatever the model says: else it could explain all by light beyond it.
       const bool clipped = block.value[i] >= plane_.saturation ||
                            (v > limit - 2 * std::sqrt(variance) && double(block.value[i]) > limit - 5 * limit_noise);
       const bool counts = i < block.count && !clipped && sectors_[block.sector[std::size_t(i)]].used;
@@ -310,7 +313,8 @@ bool ContourFit::iterate(ContourModel& model, int max_iterations, double converg
     next.p[ContourModel::blur] = std::clamp(next.p[ContourModel::blur], least_blur, most_blur);
     next.p[ContourModel::ratio] = std::clamp(next.p[ContourModel::ratio], 0.05, 0.95);
     const double next_size = next.root().determinant();
-    bool better = next_size > 0.1 * size && next_size < 10 * size && next.root().trace() > 0 &&
+    const double axes = next.root().trace();  // their sum: a sliver of the same area could be of any length
+    bool better = next_size > 0.1 * size && next_size < 10 * size && axes > 0 && axes < kLongest * (longest_ + 1) &&
                   next.center().norm() < 2 * unit_ + 10;
     Matrix next_h;
     Vector next_b;

@@ -122,7 +122,7 @@ class ContourFit {
 
   const LightPlane& plane_;
   Eigen::Vector2d origin_;
-  double unit_;
+  double unit_, longest_ = 0;
   std::vector<Block> blocks_;
   std::vector<Sector> sectors_;
   ContourSum sum_;
