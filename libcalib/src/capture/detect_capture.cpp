@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
 #include <optional>
 
 #include "../targets/target_set_impl.h"
@@ -43,6 +44,44 @@ std::optional<std::vector<Detection>> kept_targets(const fs::path& file, const s
     if (e.code() != ErrorCode::bad_input) throw;
     return std::nullopt;
   }
+}
+
+/// A copy with left and right exchanged.
+Image mirrored(const Image& photo) {
+  Image flipped = Image::uninitialized(photo.width(), photo.height(), photo.channels(), photo.type());
+  const std::size_t pixel = photo.row_bytes() / std::size_t(photo.width());
+  for (int y = 0; y < photo.height(); ++y) {
+    const std::byte* from = photo.data() + photo.row_bytes() * std::size_t(y);
+    std::byte* to = flipped.data() + photo.row_bytes() * std::size_t(y);
+    for (int x = 0; x < photo.width(); ++x)
+      std::memcpy(to + std::size_t(photo.width() - 1 - x) * pixel, from + std::size_t(x) * pixel, pixel);
+  }
+  return flipped;
+}
+
+/// Targets less the cells that had to be corrected: a pattern that is turned over is a word only by chance, if at all.
+int credit(const std::vector<Detection>& targets) {
+  int sum = 0;
+  for (const Detection& d : targets) sum += 1 - d.corrected;
+  return sum;
+}
+
+/// Targets of a photograph that was taken in a mirror, or flipped, as they stand in it: calibration names what is wrong
+/// by the sign of their homographies.
+std::vector<Detection> mirrored_targets(const TargetDetector& detector, const Image& photo, Job& job) {
+  std::vector<Detection> targets = detector.detect(mirrored(photo), job).targets;
+  Eigen::Matrix3d flip = Eigen::Matrix3d::Identity();
+  flip(0, 0) = -1;
+  flip(0, 2) = photo.width();
+  for (Detection& d : targets) {
+    d.pixel_from_target = flip * d.pixel_from_target;
+    for (Feature& f : d.features) {
+      f.pixel.x() = photo.width() - f.pixel.x();
+      f.covariance(0, 1) = f.covariance(1, 0) = -f.covariance(0, 1);
+      f.dual_conic = flip * f.dual_conic * flip.transpose();
+    }
+  }
+  return targets;
 }
 
 /// Names, cameras and moments; no targets yet.
@@ -91,6 +130,10 @@ CaptureDetections detect_capture(const Capture& capture, const TargetSet& set, c
       const Image photo = capture.read_photo(i, 0);
       seen.detections.width = photo.width(), seen.detections.height = photo.height();
       seen.detections.found = detector.detect(photo, inner);
+      std::vector<Detection>& targets = seen.detections.found.targets;
+      if (credit(targets) <= 0)
+        if (auto turned = mirrored_targets(detector, photo, inner); credit(turned) > credit(targets))
+          targets = std::move(turned);
     }
     const std::string text = internal::print_detections(set, seen);
     write_file(file, text);

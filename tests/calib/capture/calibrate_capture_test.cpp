@@ -83,6 +83,31 @@ TEST_F(CalibrateCapture, PlacesEveryPhotographAndKeepsWhatItKnows) {
   EXPECT_EQ(model.starts[0].focal_px, 0);
 }
 
+TEST_F(CalibrateCapture, APhotographTakenInAMirrorIsNamed) {
+  // One of the photographs, left and right exchanged.
+  const Image photo = read_image(scene_->photos[3]);
+  Image flipped = photo;
+  for (int y = 0; y < photo.height(); ++y)
+    for (int x = 0; x < photo.width(); ++x)
+      for (int c = 0; c < photo.channels(); ++c)
+        flipped.row<std::uint8_t>(y)[(photo.width() - 1 - x) * photo.channels() + c] =
+            photo.row<std::uint8_t>(y)[x * photo.channels() + c];
+  std::vector<fs::path> photos = scene_->photos;
+  photos[3] = mine_ / "p3.png";
+  write_png(photos[3], flipped);
+  ImportOptions import;
+  import.output = mine_ / "capture";
+  Capture capture = import_photos(photos, import, job_);
+  calibrate_capture(capture, options(), job_);
+  EXPECT_FALSE(capture.positioned(3));
+  const TargetModel model = TargetModel::of(capture);
+  const auto& removed = model.calibration.removed;
+  EXPECT_TRUE(std::any_of(removed.begin(), removed.end(), [](const Removed& r) {
+    return r.kind == Removed::Kind::photo && r.why == Removed::Why::mirrored && r.photo == 3;
+  }));
+  for (std::size_t i = 0; i < capture.shots.size(); ++i) EXPECT_EQ(capture.positioned(i), i != 3) << i;
+}
+
 TEST_F(CalibrateCapture, TheReportIsOnePageOnItsOwn) {
   Capture capture = imported();
   calibrate_capture(capture, options(), job_);
@@ -146,9 +171,11 @@ TEST_F(CalibrateCapture, TakesUpWhatWasFoundBefore) {
 TEST_F(CalibrateCapture, StopsInTheMiddleAndGoesOn) {
   Capture capture = imported();
   const std::string before = read_file(capture.folder() / "cameras.json");
-  Job stopped([&](const Progress& p) {
-    if (p.stage == "finding targets" && p.done >= 3 && p.done < p.total) stopped.cancel();
-  }, 1);
+  Job stopped(
+      [&](const Progress& p) {
+        if (p.stage == "finding targets" && p.done >= 3 && p.done < p.total) stopped.cancel();
+      },
+      1);
   EXPECT_EQ(test::expect_error([&] { calibrate_capture(capture, options(), stopped); }).code(), ErrorCode::cancelled);
   EXPECT_EQ(read_file(capture.folder() / "cameras.json"), before);
   EXPECT_FALSE(fs::exists(target_model_path(capture)));
