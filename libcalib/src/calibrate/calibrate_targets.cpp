@@ -106,7 +106,6 @@ int number_parts(Network& n, int parts) {
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(),
                    [&](int a, int b) { return photos[std::size_t(a)] > photos[std::size_t(b)]; });
-  for (int i = 0; i < parts; ++i) number[std::size_t(order[std::size_t(i)])] = i;
   int kept = 1;
   for (int i = 1; i < parts; ++i) {
     const std::size_t part = std::size_t(order[std::size_t(i)]);
@@ -352,7 +351,8 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
   for (std::size_t i = 0; i < photos.size(); ++i) {
     CalibratedPhoto& photo = c.photos[i];
     photo.part = n.photo_part[i];
-    photo.cam_from_world = n.cam_from_world[i];
+    photo.cam_from_part = n.cam_from_world[i];
+    if (photo.part == 0) photo.cam_from_world = photo.cam_from_part;
     photo.in_model = settled->shot_of_photo[i] >= 0;
     if (photo.in_model) photo.covariance = result.shot_covariances[std::size_t(settled->shot_of_photo[i])] * factor;
   }

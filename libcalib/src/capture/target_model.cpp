@@ -66,6 +66,7 @@ TargetModel TargetModel::of(const Capture& capture) {
     const auto at = shots.find(model.photos[i].name);
     if (at == shots.end()) continue;  // taken out of the capture since
     c.photos[i].cam_from_world = at->second->cam_from_world;
+    if (at->second->cam_from_world) c.photos[i].cam_from_part = at->second->cam_from_world;
     if (at->second->pose_quality) c.photos[i].covariance = at->second->pose_quality->covariance;
   }
   return model;

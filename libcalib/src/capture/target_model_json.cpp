@@ -150,8 +150,11 @@ CameraStart read_start(const JsonReader& json) {
 }
 
 Json print_photo(const TargetModel::Photo& photo, const CalibratedPhoto& p) {
-  return {{"name", photo.name}, {"camera", photo.camera}, {"in_model", p.in_model}, {"part", p.part},
-          {"points", p.points}, {"rms_px", p.rms_px},     {"reason", p.reason}};
+  Json json{{"name", photo.name}, {"camera", photo.camera}, {"in_model", p.in_model}, {"part", p.part},
+            {"points", p.points}, {"rms_px", p.rms_px},     {"reason", p.reason}};
+  // Poses in the world are those of cameras.json.
+  if (p.part > 0 && p.cam_from_part) json["cam_from_part"] = lumihull::internal::print_pose(*p.cam_from_part);
+  return json;
 }
 
 CalibratedPhoto read_photo(const JsonReader& json) {
@@ -161,6 +164,7 @@ CalibratedPhoto read_photo(const JsonReader& json) {
   p.points = int(json.at("points").integer(0, INT32_MAX));
   p.rms_px = json.at("rms_px").number(0);
   p.reason = json.at("reason").string(kLongText);
+  if (json.has("cam_from_part")) p.cam_from_part = lumihull::internal::read_pose(json.at("cam_from_part"));
   return p;
 }
 

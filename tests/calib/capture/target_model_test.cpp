@@ -18,7 +18,10 @@ using testing::HasSubstr;
 
 TEST(TargetModel, ReadsWhatItWrote) {
   const test::TemporaryFolder folder;
-  const TargetModel model = test::made_up_model();
+  TargetModel model = test::made_up_model();
+  // A photograph of a smaller part: its pose is in that part's frame.
+  model.calibration.photos[2].part = 1;
+  model.calibration.photos[2].cam_from_part = Pose{Eigen::Quaterniond::Identity(), {0.25, -0.5, 1}};
   model.save(folder / "targets.json");
   const TargetModel again = TargetModel::load(folder / "targets.json");
   EXPECT_EQ(internal::print_target_model(again, "again"), read_file(folder / "targets.json"));
@@ -32,6 +35,9 @@ TEST(TargetModel, ReadsWhatItWrote) {
     EXPECT_EQ(b.bodies[i].body.model, a.bodies[i].body.model);
     EXPECT_EQ(b.bodies[i].features.back().feature, 24);
   }
+  ASSERT_TRUE(b.photos[2].cam_from_part.has_value());
+  EXPECT_EQ(b.photos[2].cam_from_part->translation, Eigen::Vector3d(0.25, -0.5, 1));
+  EXPECT_FALSE(b.photos[2].cam_from_world.has_value());
   ASSERT_EQ(b.removed.size(), 3u);
   EXPECT_EQ(b.removed[0].photo, 1);
   EXPECT_EQ(b.removed[0].feature, 7);
@@ -139,18 +145,18 @@ TEST(DetectionsFile, ReadsWhatItWroteAndNamesWhatIsWrong) {
 
   const Json good = Json::parse(text);
   EXPECT_EQ(good["detections"]["refused"]["no_code"], 2);
-  for (const auto& [pointer, value] : std::vector<std::pair<const char*, Json>>{
-           {"/version", 3},
-           {"/detections/width", 0},
-           {"/detections/targets/0/design", 2},
-           {"/detections/targets/0/family", "matrix6x6"},
-           {"/detections/targets/1/id", 250},
-           {"/detections/targets/0/features/1/index", 0},
-           {"/detections/targets/0/features/2/index", 25},
-           {"/detections/targets/0/features/0/pixel", {1, "2"}},
-           {"/detections/targets/0/features/0/covariance", {1, 2, 1}},
-           {"/detections/targets/0/features/0/dual_conic", {1, 2}},
-           {"/detections/targets/0/pixel_from_target", {1, 2}}}) {
+  for (const auto& [pointer, value] :
+       std::vector<std::pair<const char*, Json>>{{"/version", 3},
+                                                 {"/detections/width", 0},
+                                                 {"/detections/targets/0/design", 2},
+                                                 {"/detections/targets/0/family", "matrix6x6"},
+                                                 {"/detections/targets/1/id", 250},
+                                                 {"/detections/targets/0/features/1/index", 0},
+                                                 {"/detections/targets/0/features/2/index", 25},
+                                                 {"/detections/targets/0/features/0/pixel", {1, "2"}},
+                                                 {"/detections/targets/0/features/0/covariance", {1, 2, 1}},
+                                                 {"/detections/targets/0/features/0/dual_conic", {1, 2}},
+                                                 {"/detections/targets/0/pixel_from_target", {1, 2}}}) {
     Json wrong = good;
     wrong[Json::json_pointer(pointer)] = value;
     const Error e = test::expect_error([&] { internal::parse_detections(wrong.dump(), "d", set); });

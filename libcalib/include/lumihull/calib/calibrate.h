@@ -74,12 +74,14 @@ struct Removed {
 };
 
 struct CalibratedPhoto {
-  std::optional<Pose> cam_from_world;
+  std::optional<Pose> cam_from_world;  ///< of photographs of part 0
+  /// In the frame of a smaller part, whose place in the world nothing tells; with cam_from_world: the same.
+  std::optional<Pose> cam_from_part;
   /// Of (rotation vector, translation) of a small motion applied after cam_from_world: rad, m.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   bool in_model = false;  ///< took part in the adjustment; else placed by resection
   std::string reason;     ///< why it is in the model, or was placed afterwards, or has no pose
-  int part = -1;          ///< which connected part of the photographs it belongs to; 0: the one with poses
+  int part = -1;          ///< which connected part of the photographs it belongs to; 0: the largest; -1: none
   int points = 0;         ///< that count
   double rms_px = 0;
 };
@@ -142,8 +144,9 @@ LUMIHULL_API std::vector<CalibratedBody> bodies_of(const TargetSet& set, std::sp
 /// is needed. Planar poses with both mirror solutions, a chain of photographs and bodies that grows from the pair that
 /// is surest, adjustments in between, data snooping, resection of the rest (paper, section 3.1).
 ///
-/// World: metres, the frame of the first placed body of most observations. Errors: invalid_argument; degenerate
-/// (nothing can be placed: says why); cancelled.
+/// World: metres; origin in the middle of the targets and z up from them where they lie on one sheet or table, else the
+/// frame of the body that is seen in most photographs. Errors: invalid_argument; degenerate (nothing can be placed:
+/// says why); cancelled.
 LUMIHULL_API Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets> photos,
                                            std::span<const CameraStart> cameras, const CalibrateOptions& options,
                                            Job& job);
