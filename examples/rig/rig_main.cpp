@@ -47,6 +47,11 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0, 255));
   app.add_flag("--blue", options.blue, "a blue enclosure instead of a green one");
   app.add_flag("--pedestal", options.pedestal, "the object stands on a pedestal");
+  app.add_flag("--targets", options.targets,
+               "printed targets on walls and floor; photographs and sheets.json for importers, cameras are not told");
+  app.add_option("--target-px", options.target_px, "diameter of the targets' circles in the photographs, px")
+      ->capture_default_str();
+  app.add_option("--blur", options.photo.blur_px, "of the lens, px (sigma)")->capture_default_str();
   app.add_flag("--no-distortion", no_distortion, "an ideal lens");
   app.add_option("--format", options.format, "of the photographs")
       ->transform(CLI::CheckedTransformer(
@@ -59,7 +64,8 @@ int main(int argc, char** argv) {
                  "pictures along an arc for judging a renderer, into truth/: free of noise, with camera path and masks")
       ->capture_default_str();
   app.add_option("--seed", options.seed, "of paint, noise and trajectory")->capture_default_str();
-  app.add_flag("--plain", plain, "plain files and P.txt instead of a capture folder; implies --no-distortion");
+  app.add_flag("--plain", plain,
+               "plain files and P.txt (without targets) instead of a capture folder; implies --no-distortion");
   app.add_flag("--fast", fast, "trace a third of the size and enlarge; noise at full size");
   app.add_option("--threads", threads, "0: one for each core")->capture_default_str();
   try {
@@ -86,7 +92,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, stop);
   int status = 0;
   try {
-    if (plain)
+    if (plain || options.targets)
       rig::make_photographs(output, options, job);
     else
       rig::make_capture(output, options, job);

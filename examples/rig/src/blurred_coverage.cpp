@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "flat_coverage.h"
+#include "gaussian_blur.h"
 
 // Pixels are samples of edges, which hold detail at all frequencies; a Gaussian applied to them would blur what has
 // been aliased already, and move circles of 6 px by up to .008 px. So the first .8 px of blur are applied to parts of
@@ -18,29 +19,13 @@ namespace {
 constexpr int kParts = 3;
 constexpr double kFineSigma = .8;  ///< px
 constexpr double kAllFine = 1.25;  ///< px; from here on the rest is wide enough to be sampled at pixels (sigma > .9)
-constexpr double kReach = 4.5;     ///< of the Gaussian, sigmas
-
-/// Samples of a Gaussian at -reach … reach with the sum 1.
-std::vector<float> gaussian_samples(double sigma, int reach) {
-  std::vector<double> g;
-  double sum = 0;
-  for (int i = -reach; i <= reach; ++i) g.push_back(std::exp(-.5 * i * i / (sigma * sigma))), sum += g.back();
-  std::vector<float> result;
-  for (const double v : g) result.push_back(float(v / sum));
-  return result;
-}
-
-/// out += g in
-void add(float* out, float g, const float* in, std::size_t n) {
-  Eigen::Map<Eigen::ArrayXf>(out, Eigen::Index(n)) += g * Eigen::Map<const Eigen::ArrayXf>(in, Eigen::Index(n));
-}
 
 /// Weights of the parts at -before … for a pixel whose first part is part 0: Gaussian and pixel's square.
 struct PartKernel {
   int before = 0;
   std::vector<float> weight;
   PartKernel(double sigma, int parts) {
-    before = std::max(1, int(std::ceil(kReach * sigma * parts)));
+    before = std::max(1, int(std::ceil(kGaussianReach * sigma * parts)));
     const std::vector<float> g = gaussian_samples(sigma * parts, before);
     weight.assign(g.size() + std::size_t(parts) - 1, 0);
     for (std::size_t i = 0; i < g.size(); ++i)
@@ -81,7 +66,7 @@ Image sampled(FlatCoverage& coverage, int width, int height, double sigma, int p
     std::fill(down.begin(), down.end(), 0.f);
     for (int k = 0; k < taps; ++k) {
       const float* in = &rows[std::size_t(std::clamp(first + k, 0, fine_rows - 1) % ring) * values];
-      add(down.data(), kernel.weight[std::size_t(k)], in, values);
+      add_scaled(down.data(), kernel.weight[std::size_t(k)], in, values);
     }
     for (int p = 0; p < parts; ++p)
       for (int c = 0; c < 3; ++c) {
@@ -95,7 +80,7 @@ Image sampled(FlatCoverage& coverage, int width, int height, double sigma, int p
       const float g = kernel.weight[std::size_t(k)];
       for (int c = 0; c < 3; ++c) {
         const float* in = &phases[std::size_t(3 * (part % parts) + c) * phase_length + std::size_t(part / parts)];
-        add(&across[std::size_t(c) * std::size_t(width)], g, in, std::size_t(width));
+        add_scaled(&across[std::size_t(c) * std::size_t(width)], g, in, std::size_t(width));
       }
     }
     float* out = image.row<float>(y);
@@ -103,36 +88,6 @@ Image sampled(FlatCoverage& coverage, int width, int height, double sigma, int p
       for (int c = 0; c < 3; ++c) out[3 * x + c] = across[std::size_t(c) * std::size_t(width) + std::size_t(x)];
   }
   return image;
-}
-
-/// Separable, on pixels.
-void blur(Image& image, double sigma) {
-  const int reach = std::max(1, int(std::ceil(kReach * sigma)));
-  const std::vector<float> kernel = gaussian_samples(sigma, reach);
-  const int w = image.width(), h = image.height();
-  std::vector<float> padded(std::size_t(w + 2 * reach) * 3);
-  for (int y = 0; y < h; ++y) {
-    float* row = image.row<float>(y);
-    for (int x = -reach; x < w + reach; ++x)
-      std::copy_n(row + std::ptrdiff_t(3) * std::clamp(x, 0, w - 1), 3, &padded[std::size_t(x + reach) * 3]);
-    std::fill_n(row, std::size_t(w) * 3, 0.f);
-    for (std::size_t k = 0; k < kernel.size(); ++k)
-      add(row, kernel[k], &padded[k * 3], std::size_t(3) * std::size_t(w));
-  }
-  // Down the columns: strips that stay in the cache.
-  constexpr int kStrip = 96;
-  std::vector<float> strip(std::size_t(h) * kStrip);
-  for (int x0 = 0; x0 < 3 * w; x0 += kStrip) {
-    const int n = std::min(kStrip, 3 * w - x0);
-    for (int y = 0; y < h; ++y) std::copy_n(image.row<float>(y) + x0, n, &strip[std::size_t(y) * kStrip]);
-    for (int y = 0; y < h; ++y) {
-      float* out = image.row<float>(y) + x0;
-      std::fill_n(out, n, 0.f);
-      for (int k = -reach; k <= reach; ++k)
-        add(out, kernel[std::size_t(k + reach)], &strip[std::size_t(std::clamp(y + k, 0, h - 1)) * kStrip],
-            std::size_t(n));
-    }
-  }
 }
 
 }  // namespace
@@ -146,7 +101,7 @@ Image blurred_coverage(const View& view, std::span<const FlatPrint> prints, cons
   if (sigma > 0) {
     const double fine = sigma < kAllFine ? sigma : kFineSigma;
     Image image = sampled(coverage, width, height, fine, parts);
-    if (fine < sigma) blur(image, std::sqrt(sigma * sigma - fine * fine));
+    if (fine < sigma) gaussian_blur(image, std::sqrt(sigma * sigma - fine * fine));
     return image;
   }
   Image image = Image::uninitialized(width, height, 3, PixelType::f32);

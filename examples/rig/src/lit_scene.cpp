@@ -48,6 +48,7 @@ Vector3f LightMap::at(float u, float v) const {
 LitScene::LitScene(const Scene& scene, const LightOptions& options, Job& job)
     : room_(scene.enclosure),
       lamps_(scene.lamps),
+      sheets_(scene.sheets),
       ambient_(scene.ambient),
       center_(scene.center()),
       radius_(scene.radius()) {
@@ -233,6 +234,11 @@ void LitScene::light_objects(const LightOptions& options, Job& job) {
 }
 
 Vector3f LitScene::room_radiance(const RoomHit& hit) const {
+  if (hit.surface == Room::kCeiling) return room_.enclosure().ceiling;
+  return room_.paint(hit).cwiseProduct(room_light(hit));
+}
+
+Vector3f LitScene::room_light(const RoomHit& hit) const {
   const Enclosure& e = room_.enclosure();
   const Vector3f& p = hit.point;
   const auto square = [&](const LightMap& map, float half) {
@@ -241,7 +247,7 @@ Vector3f LitScene::room_radiance(const RoomHit& hit) const {
   Vector3f light;
   switch (hit.surface) {
     case Room::kCeiling:
-      return e.ceiling;
+      return Vector3f::Zero();
     case Room::kFloor:
       light = std::max(std::fabs(p.x()), std::fabs(p.y())) < near_floor_
                   ? square(floor_near_, near_floor_)
@@ -262,7 +268,7 @@ Vector3f LitScene::room_radiance(const RoomHit& hit) const {
       light = panels_[std::size_t(hit.surface - Room::kPanels)].at(.5f + .5f * across / half, p.z() / e.height);
     }
   }
-  return room_.paint(hit).cwiseProduct(light);
+  return light;
 }
 
 Vector3f LitScene::blurred_room(const Vector3f& from, const Vector3f& way, float blur) const {

@@ -35,6 +35,9 @@ class LitScene {
 
   Eigen::Vector3f object_radiance(const hull::Ray& ray, const hull::Hit& hit) const;
   Eigen::Vector3f room_radiance(const RoomHit& hit) const;
+  /// Light at a place of the room; the ceiling has none.
+  Eigen::Vector3f room_light(const RoomHit& hit) const;
+  const std::vector<FlatPrint>& sheets() const { return sheets_; }
 
  private:
   struct Part {
@@ -59,6 +62,7 @@ class LitScene {
 
   Room room_;
   std::vector<Lamp> lamps_;
+  std::vector<FlatPrint> sheets_;
   Eigen::Vector3f ambient_;
   Eigen::Vector3f center_;
   float radius_ = 0;

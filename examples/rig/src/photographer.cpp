@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "develop.h"
+#include "gaussian_blur.h"
 #include "lit_scene.h"
 #include "noise.h"
+#include "sheets.h"
 
 namespace lumihull::rig {
 
@@ -160,7 +162,8 @@ class RowTracer {
 void check(const PhotoOptions& o) {
   const auto within = [](double x, double low, double high) { return x >= low && x <= high; };
   if (!within(o.rays, 1, 64) || !within(o.edge_rays, 1, 64) || !within(o.exposure, 1e-6, 1e6) ||
-      !within(o.full_well, 0, 1e12) || !within(o.read_noise, 0, 1e9) || !within(o.reduce, 1, 64))
+      !within(o.blur_px, 0, 100) || !within(o.full_well, 0, 1e12) || !within(o.read_noise, 0, 1e9) ||
+      !within(o.reduce, 1, 64))
     throw Error(ErrorCode::invalid_argument, "photo options are out of range", "rig");
   if (o.depth && o.reduce > 1)
     throw Error(ErrorCode::invalid_argument, "depth is known at full size only: reduce must be 1", "rig");
@@ -198,6 +201,11 @@ Photo Photographer::photograph(const View& view, const PhotoOptions& options, st
     enlarged(exposure.light);
     enlarged(exposure.cover);
   }
+  if (options.blur_px > 0) {
+    gaussian_blur(exposure.light, options.blur_px);
+    gaussian_blur(exposure.cover, options.blur_px);
+  }
+  add_sheets(impl_->scene, view, options.blur_px, exposure.cover, exposure.light, job);
   Photo photo;
   photo.picture = develop(exposure.light, options, mix(seed), job);
   photo.mask = converted(exposure.cover, PixelType::u8, 1);

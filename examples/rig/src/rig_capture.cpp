@@ -3,6 +3,7 @@
 #include <lumihull/base/parallel.h>
 #include <lumihull/rig/exif.h>
 #include <lumihull/rig/rig_capture.h>
+#include <lumihull/rig/target_sheets.h>
 #include <lumihull/rig/trajectory.h>
 
 #include <algorithm>
@@ -32,6 +33,7 @@ std::vector<std::string> names(const char* prefix, int n) {
 struct Session {
   Scene scene;
   Camera camera;
+  RoomTargets targets;
   NamedShots shots, empty_shots, test_views;
 };
 
@@ -70,6 +72,11 @@ Session plan(const RigOptions& o) {
   around.target = session.scene.center().cast<double>();
   around.radius = framing_distance(session.camera, session.scene.radius(), o.fill);
   around.seed = mix(o.seed, 1);
+  if (o.targets) {
+    session.targets = scatter_targets(session.scene, session.camera, around.radius,
+                                      {.circle_px = o.target_px, .seed = mix(o.seed, 5)});
+    session.scene.sheets = std::move(session.targets.prints);
+  }
   if (o.path == Path::ring) around.phi_first = around.phi_last = 1.2;
   const auto shots = [&](int n, const char* prefix) {
     NamedShots named;
@@ -153,6 +160,7 @@ Taken take_all(const fs::path& folder, const RigOptions& o, Job& job) {
   taken.files = take(photographer, s.camera, s.shots, o, "photographs", folder / "photos",
                      o.truth_masks ? truth / "masks" : fs::path(), mix(o.seed, 3), job);
   write_camera_truth(truth / "cameras.json", s.scene, s.camera, s.shots);
+  if (o.targets) write_target_truth(truth / "targets.json", s.targets.placed);
   hull::write_mesh(truth / "mesh.ply", s.scene.objects[0].mesh);
   const HighlightFinder finder(s.scene);
   if (finder.any()) write_highlights(truth / "highlights.json", finder, s.camera, s.shots, o.photo.exposure, job);
@@ -174,6 +182,8 @@ Taken take_all(const fs::path& folder, const RigOptions& o, Job& job) {
 }  // namespace
 
 Capture make_capture(const fs::path& folder, const RigOptions& options, Job& job) {
+  if (options.targets)
+    throw Error(ErrorCode::invalid_argument, "photographs with targets are for importers: make_photographs", "rig");
   Capture capture = Capture::create(folder);
   const Taken taken = take_all(folder, options, job);
   capture.unit = Unit::metres;
@@ -200,11 +210,15 @@ Capture make_capture(const fs::path& folder, const RigOptions& options, Job& job
 }
 
 void make_photographs(const fs::path& folder, const RigOptions& options, Job& job) {
-  if (options.distortion)
+  if (options.distortion && !options.targets)
     throw Error(ErrorCode::invalid_argument, "projection matrices need a lens without distortion", "rig");
   if (fs::exists(folder) && !fs::is_empty(folder))
     throw Error(ErrorCode::invalid_argument, "expected a folder that is new or empty", folder.string());
   const Taken taken = take_all(folder, options, job);
+  if (options.targets) {
+    taken.session.targets.set.save(folder / "sheets.json");
+    return;
+  }
   std::string listing;
   for (std::size_t i = 0; i < taken.files.size(); ++i) {
     const Eigen::Matrix<double, 3, 4> p =

@@ -46,6 +46,20 @@ void write_camera_truth(const std::filesystem::path& file, const Scene& scene, c
   write(file, json);
 }
 
+void write_target_truth(const std::filesystem::path& file, const std::vector<PlacedTarget>& targets) {
+  Json json = document("lumihull-rig-targets");
+  json["targets"] = Json::array();
+  for (const PlacedTarget& t : targets) {
+    const Eigen::Quaterniond& q = t.world_from_target.rotation;
+    json["targets"].push_back(
+        {{"design", t.design},
+         {"id", t.id},
+         {"world_from_target",
+          {{"q", {q.w(), q.x(), q.y(), q.z()}}, {"t", numbers(t.world_from_target.translation)}}}});
+  }
+  write(file, json);
+}
+
 void write_highlights(const std::filesystem::path& file, const HighlightFinder& finder, const Camera& camera,
                       const NamedShots& shots, double exposure, Job& job) {
   std::vector<std::vector<Highlight>> found(shots.names.size());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <lumihull/rig/highlights.h>
+#include <lumihull/rig/target_sheets.h>
 
 #include <filesystem>
 #include <string>
@@ -17,6 +18,9 @@ struct NamedShots {
 /// {"format": "lumihull-rig-truth", "version": 1, "unit": "m", "camera": …, "object": …, "lamps": …, "views": …}
 void write_camera_truth(const std::filesystem::path& file, const Scene& scene, const Camera& camera,
                         const NamedShots& shots);
+
+/// Where each sheet hangs.
+void write_target_truth(const std::filesystem::path& file, const std::vector<PlacedTarget>& targets);
 
 /// {"format": "lumihull-highlights", "version": 1, "shots": [{"name": "0001", "highlights": [{"lamp": 0,
 ///  "point": [x, y, z], "pixel": [u, v], "strength": s}]}]}: what HighlightFinder finds; m and px; strength is that of

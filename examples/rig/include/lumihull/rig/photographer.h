@@ -23,6 +23,7 @@ struct LightOptions {
 struct PhotoOptions {
   int rays = 2;              ///< rays x rays a pixel …
   int edge_rays = 6;         ///< … and so many where the first ones disagree: outlines
+  double blur_px = 0;        ///< of the lens: sigma of a Gaussian, in linear light, 0 … 100
   double exposure = 1;       ///< radiance 1 / exposure is white
   double full_well = 25000;  ///< electrons at white: shot noise. 0: none
   double read_noise = 9;     ///< electrons

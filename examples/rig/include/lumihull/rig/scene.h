@@ -1,5 +1,6 @@
 #pragma once
 
+#include <lumihull/rig/flat_print.h>
 #include <lumihull/rig/object.h>
 
 #include <Eigen/Core>
@@ -36,6 +37,8 @@ struct Scene {
   std::vector<Object> objects;
   Enclosure enclosure;
   std::vector<Lamp> lamps;
+  /// Printed sheets that lie on walls and floor, lit as the paint there; objects and the pedestal stand before them.
+  std::vector<FlatPrint> sheets;
   Eigen::Vector3f ambient{.20f, .24f, .20f};  ///< light that paint receives from everywhere (many bounces)
 
   /// Centre and radius of a ball around all objects; (0,0,0) and 0 without objects.
