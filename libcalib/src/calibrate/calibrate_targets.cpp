@@ -379,8 +379,7 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
   c.removed = std::move(n.removed);
   c.parts = parts;
   if (options.cross_validate) cross_validate(n, last, c, job);
-  check_bars(options.bars, c);
-  judge_calibration(c, photos);
+  judge_calibration(c, photos, check_bars(options, c));
   return c;
 }
 
