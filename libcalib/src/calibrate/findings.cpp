@@ -187,10 +187,10 @@ void judge_calibration(Calibration& c, std::span<const PhotoTargets> photos, int
     doubts.push_back(
         formatted("two halves of the photographs differ by %.1f times what is expected", c.cross_validation_sigma));
   if (c.sigma0 > 3)
-    doubts.push_back(
-        formatted("residuals are %.1f times what the measurements' noise explains: the print is not "
-                  "flat or not to scale, or the lens is not of this model",
-                  c.sigma0));
+    doubts.push_back(formatted(
+        "residuals are %.1f times what the measurements' noise explains: rough or bent paper, a print that is "
+        "not to scale, or a lens that is not of this model; the uncertainties given are enlarged as much",
+        c.sigma0));
   if (contradicting_bars > 0)
     doubts.push_back(formatted("%d of the scale bars can't be true together with the rest", contradicting_bars));
   if (few > 0) doubts.push_back(formatted("%zu photographs rest on fewer than eight points", few));
@@ -205,14 +205,16 @@ void judge_calibration(Calibration& c, std::span<const PhotoTargets> photos, int
       doubts.push_back("the focal length is weak");
     }
   }
-  std::string rare;
-  int count = 0;
-  for (const CalibratedBody& b : c.bodies)
-    if (b.placed && b.photos < 3 && ++count <= 5) rare += (count > 1 ? ", " : "") + b.name;
-  if (count > 0)
-    c.warnings.push_back(
-        formatted("%d of the targets are seen in fewer than three photographs, so nothing checks them: ", count) +
-        rare + (count > 5 ? ", …" : ""));
+  for (const int times : {2, 1}) {
+    std::string rare;
+    int count = 0;
+    for (const CalibratedBody& b : c.bodies)
+      if (b.placed && b.photos == times && ++count <= 5) rare += (count > 1 ? ", " : "") + b.name;
+    if (count > 0)
+      c.warnings.push_back(std::string(times == 2 ? "seen only twice" : "seen only once") +
+                           ": can't be checked, a misread number would not show: " + rare +
+                           (count > 5 ? formatted(" and %d more", count - 5) : ""));
+  }
   std::string figures = formatted("%zu of %zu photographs placed, %.3f px RMS over %.1f %% of the observations", placed,
                                   photos.size(), c.rms_px, 100 * c.share);
   if (c.cross_validation_m >= 0) figures += formatted(", halves agree to %.3f mm", 1000 * c.cross_validation_m);
