@@ -179,6 +179,7 @@ StageFlags::StageFlags(CLI::App* verb, std::vector<std::string_view> stages) {
       std::string help = spec.help + " [" + shown(spec.fallback) + "]";
       flag->option = verb->add_option(flag_name(spec.name), flag->text, help);
       if (std::holds_alternative<bool>(spec.fallback)) flag->option->expected(0, 1)->default_str("true");
+      if (spec.several) flag->option->take_all();
       if (!spec.choices.empty()) {
         std::string choices;
         for (const std::string& c : spec.choices) choices += (choices.empty() ? "" : "|") + c;
@@ -195,7 +196,8 @@ StageFlags::StageFlags(CLI::App* verb, std::vector<std::string_view> stages) {
 void StageFlags::store(Capture& capture) const {
   for (const auto& flag : flags_) {
     if (flag->option->count() == 0) continue;
-    const std::string text = flag->option->results().empty() ? "true" : flag->option->results().front();
+    std::string text = flag->option->results().empty() ? "true" : flag->option->results().front();
+    for (std::size_t i = 1; i < flag->option->results().size(); ++i) text += ";" + flag->option->results()[i];
     slf::set_option_text(capture, flag->stage, flag->name, text.empty() || text == "{}" ? "true" : text);
   }
 }
@@ -279,7 +281,8 @@ std::vector<std::string> drawing_names(const std::string& folder, const std::vec
   for (const std::string& name : names)
     for (const std::string& photo : photos)
       if (fs::exists(name) && fs::exists(photo) && fs::equivalent(name, photo))
-        throw Error(ErrorCode::invalid_argument, "the drawing would replace the photograph; name another folder", photo);
+        throw Error(ErrorCode::invalid_argument, "the drawing would replace the photograph; name another folder",
+                    photo);
   return names;
 }
 

@@ -58,6 +58,8 @@ calib::CalibrateCaptureOptions options_of(const Capture& capture) {
   o.solve.model_photos = int(effective<std::int64_t>(capture, "calibrate", "model_photos"));
   o.solve.outlier_sigma = effective<double>(capture, "calibrate", "outlier_sigma");
   o.solve.rig = effective<bool>(capture, "calibrate", "rig");
+  o.bars = calib::bars_from_text(effective<std::string>(capture, "calibrate", "bar"));
+  o.solve.free_print_scale = effective<bool>(capture, "calibrate", "free_print_scale");
   return o;
 }
 
@@ -187,15 +189,31 @@ const StageDefinition& calibrate_stage() {
            std::int64_t(kSolve.model_photos), 0, 1e6},
           {"outlier_sigma", "points farther off than so many standard deviations are removed", kSolve.outlier_sigma, 2,
            100},
-          {"rig", "cameras are fixed to each other; the nth photographs of all cameras were taken at one moment",
+          {"rig",
+           "cameras are fixed to each other: the nth photograph of each camera, in the order of import, was taken at "
+           "one "
+           "moment, so that each must have as many",
            kSolve.rig},
+          {"bar",
+           "a distance that was measured between two points of targets: ID.POINT,ID.POINT,LENGTH[,SIGMA], in metres or "
+           "as "
+           "500mm; several times, or by semicolons. POINT: circles row by row from 0, corners clockwise",
+           std::string(),
+           0,
+           0,
+           {},
+           false,
+           false,
+           true},
+          {"free_print_scale", "the print's scale along its x and y is estimated too; needs bars",
+           kSolve.free_print_scale},
           {"ink_key", "a trained key of the targets' ink; empty: by contrast", std::string(), 0, 0, {}, true},
           {"min_circle_px", "smallest minor axis of a target's circles that is looked for, px",
            kDefaults.detect.min_circle_px, 3, 1000},
           {"features", "without targets: poses by COLMAP's features (its program `colmap` must be installed)", false},
           {"sequential", "features: match each photograph with those that follow it only, as in a film", false},
-          {"scale_distance", "features: NAME_A NAME_B METRES, the distance of two photographs' cameras, gives the scale",
-           std::string()},
+          {"scale_distance",
+           "features: NAME_A NAME_B METRES, the distance of two photographs' cameras, gives the scale", std::string()},
       },
       needed,
       inputs,

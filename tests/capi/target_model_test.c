@@ -88,6 +88,19 @@ int main(int argc, char **argv) {
   CHECK_SAYS(ctx, "p0");
   EXPECT(ctx, LH_ENOTFOUND, lh_capture_camera_covariance(ctx, capture, 0, covariance));
   EXPECT(ctx, LH_EINVAL, lh_capture_camera_covariance(ctx, capture, 1, covariance));
+
+  /* Measured distances go to the stage as its other options do. */
+  MUST(ctx, lh_capture_set_option(ctx, capture, "calibrate", "targets", "matrix5x5:18mm"));
+  MUST(ctx, lh_capture_set_option(ctx, capture, "calibrate", "free_print_scale", "true"));
+  EXPECT(ctx, LH_EINVAL, lh_capture_run_stage(ctx, capture, "calibrate", 0, NULL, NULL));
+  CHECK_SAYS(ctx, "can only be told from scale bars");
+  MUST(ctx, lh_capture_set_option(ctx, capture, "calibrate", "bar", "1.0,2.24,0.5,0.1mm;3.0,4.24,5ft"));
+  MUST(ctx, lh_capture_get_option(ctx, capture, "calibrate", "bar", text, sizeof text, &needed));
+  CHECK(strcmp(text, "1.0,2.24,0.5,0.1mm;3.0,4.24,5ft") == 0);
+  EXPECT(ctx, LH_EINVAL, lh_capture_run_stage(ctx, capture, "calibrate", 0, NULL, NULL));
+  CHECK_SAYS(ctx, "3.0,4.24,5ft");
+  MUST(ctx, lh_capture_set_option(ctx, capture, "calibrate", "bar", "1.0,2.24,0.5"));
+  EXPECT(ctx, LH_EDEGENERATE, lh_capture_run_stage(ctx, capture, "calibrate", 0, NULL, NULL)); /* black pictures */
   lh_target_model_destroy(model);
   lh_capture_destroy(capture);
   lh_context_destroy(ctx);

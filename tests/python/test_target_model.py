@@ -61,3 +61,26 @@ def test_the_stage_says_what_it_needs(capture: lumihull.Capture) -> None:
     with pytest.raises(lumihull.Error) as caught:
         capture.run_stage("calibrate")
     assert caught.value.code == "degenerate"
+
+
+def test_bars_reach_the_stage(capture: lumihull.Capture) -> None:
+    capture.set_option("calibrate", "targets", "matrix5x5:18mm")
+    capture.set_option("calibrate", "bar", "1.0,2.24,0.5,0.1mm; 3.0,4")
+    with pytest.raises(lumihull.Error) as caught:
+        capture.run_stage("calibrate")
+    assert caught.value.code == "invalid_argument" and caught.value.subject == "bar" and "3.0,4" in caught.value.message
+    capture.set_option("calibrate", "bar", "")
+    capture.set_option("calibrate", "free_print_scale", True)
+    with pytest.raises(lumihull.Error) as caught:
+        capture.run_stage("calibrate")
+    assert caught.value.code == "invalid_argument" and caught.value.subject == "free_print_scale"
+    capture.set_option("calibrate", "bar", "1.0,2.24,0.5")
+    with pytest.raises(lumihull.Error) as caught:
+        capture.run_stage("calibrate")
+    assert caught.value.code == "degenerate"  # black photographs
+    capture.set_option("calibrate", "bar", "")
+    capture.set_option("calibrate", "free_print_scale", False)
+    capture.set_option("calibrate", "rig", True)
+    with pytest.raises(lumihull.Error) as caught:
+        capture.run_stage("calibrate")
+    assert caught.value.subject == "rig" and "several cameras" in caught.value.message

@@ -400,7 +400,7 @@ void FlatCoverage::Renderer::tile(int x0, int y0, float* out) {
   std::vector<const Sheet*> sheets;
   for (const Sheet& sheet : sheets_) {
     Box box;
-    bool horizon = !valid;
+    bool horizon = !valid, before = !valid;
     for (const auto& [x, y] : {std::array{0, 0},
                                {width, 0},
                                {0, height},
@@ -413,8 +413,9 @@ void FlatCoverage::Renderer::tile(int x0, int y0, float* out) {
       if (!(h.z() > 1e-12))
         horizon = true;
       else
-        box.add(h.head<2>() / h.z());
+        before = true, box.add(h.head<2>() / h.z());
     }
+    if (!before) continue;  // all of the tile looks past the sheet's plane
     const Vector2d slack = 0.25 * (box.high - box.low);
     box.low -= slack, box.high += slack;
     if (horizon || box.meets(sheet.box())) sheets.push_back(&sheet);

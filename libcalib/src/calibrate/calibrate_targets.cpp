@@ -144,8 +144,10 @@ void clean(Network& n, int part, const CalibrateOptions& options, Job& job) {
   }
 }
 
-/// A photograph beyond the model: the pose that its points and the model's agree on.
-void place_rest(Network& n, const CalibrateOptions& options, std::vector<CalibratedPhoto>& photos, Job& job) {
+/// A photograph beyond the model: the pose that its points and the model's agree on. factor: how much larger variances
+/// are than the detections' own, as the adjustment found.
+void place_rest(Network& n, const CalibrateOptions& options, double factor, std::vector<CalibratedPhoto>& photos,
+                Job& job) {
   parallel_for(job, n.photos.size(), [&](std::size_t i) {
     if (n.in_model[i] || n.by_photo[i].empty() || n.photo_part[i] >= 0 || !place_photo(n, int(i), 0)) return;
     std::vector<PointMatch> matches;
@@ -153,7 +155,10 @@ void place_rest(Network& n, const CalibrateOptions& options, std::vector<Calibra
     for (const int s : n.by_photo[i]) {
       const Sighting& sighting = n.sightings[std::size_t(s)];
       if (n.body_part[std::size_t(sighting.body)] != 0) continue;
-      for (const std::uint32_t k : sighting.seen) matches.push_back(n.match(n.seen[k], true)), seen.push_back(k);
+      for (const std::uint32_t k : sighting.seen) {
+        matches.push_back(n.match(n.seen[k], true)), seen.push_back(k);
+        matches.back().covariance *= factor;
+      }
     }
     ResectOptions resect_options;
     resect_options.outlier_sigma = std::clamp(options.outlier_sigma, 2.0, 100.0);
@@ -339,12 +344,11 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
 
   c.photos.resize(photos.size());
   for (std::size_t i = 0; i < photos.size(); ++i) c.photos[i].reason = model.reason[i];
-  place_rest(n, options, c.photos, job);
-
   const AdjustResult& result = settled->result;
   c.sigma0 = result.sigma0;
   c.print_scale = result.adjusted.print_scale;
   const double factor = std::max(1.0, c.sigma0 * c.sigma0);
+  place_rest(n, options, factor, c.photos, job);
   c.cameras = n.cameras;
   c.cam_from_rig = settled->cam_from_rig;
   for (const auto& covariance : result.camera_covariances) c.camera_covariances.push_back(covariance * factor);
@@ -360,7 +364,9 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
   name_unplaced_photos(n, 0, c.photos);
   for (std::size_t b = 0; b < n.bodies.size(); ++b) {
     CalibratedBody& body = n.bodies[b];
-    body.placed = n.body_part[b] == 0;
+    body.part = n.body_part[b];
+    if (body.part >= 0) body.part_from_body = body.body.world_from_body;
+    body.placed = body.part == 0;
     if (!body.placed) continue;
     for (std::size_t k = 0; k < body.body.points.size(); ++k) body.points.push_back(body.body.point(k, n.print_scale));
     const int index = settled->body_of[b];
@@ -379,8 +385,7 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
   c.removed = std::move(n.removed);
   c.parts = parts;
   if (options.cross_validate) cross_validate(n, last, c, job);
-  check_bars(options.bars, c);
-  judge_calibration(c, photos);
+  judge_calibration(c, photos, check_bars(options, c));
   return c;
 }
 

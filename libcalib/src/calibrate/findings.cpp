@@ -153,24 +153,28 @@ void name_unplaced_photos(Network& n, int part, std::vector<CalibratedPhoto>& ph
   }
 }
 
-void check_bars(const std::vector<ScaleBar>& bars, Calibration& c) {
-  for (const ScaleBar& bar : bars) {
+int check_bars(const CalibrateOptions& options, Calibration& c) {
+  int contradict = 0;
+  for (const ScaleBar& bar : options.bars) {
     const CalibratedBody &a = c.bodies[bar.body_a], &b = c.bodies[bar.body_b];
     if (!a.placed || !b.placed) {
       c.warnings.push_back("scale bar " + bar.name + ": " + (a.placed ? b.name : a.name) + " was not placed");
       continue;
     }
     const double length = (a.points[bar.point_a] - b.points[bar.point_b]).norm();
-    if (std::abs(length - bar.length_m) > 3 * bar.sigma_m)
-      c.warnings.push_back("scale bar " + bar.name +
-                           formatted(": %.3f mm as given, %.3f mm as solved, %.1f standard "
-                                     "deviations apart: it contradicts the targets' size or another bar",
-                                     1000 * bar.length_m, 1000 * length,
-                                     std::abs(length - bar.length_m) / bar.sigma_m));
+    if (!(std::abs(length - bar.length_m) > 3 * bar.sigma_m)) continue;
+    ++contradict;
+    c.warnings.push_back(
+        "scale bar " + bar.name +
+        formatted(": %.3f mm as given, %.3f mm as solved, %.1f standard deviations apart: it contradicts ",
+                  1000 * bar.length_m, 1000 * length, std::abs(length - bar.length_m) / bar.sigma_m) +
+        (options.free_print_scale ? "another bar"
+                                  : "the targets' size, unless the print's scale is free, or another bar"));
   }
+  return contradict;
 }
 
-void judge_calibration(Calibration& c, std::span<const PhotoTargets> photos) {
+void judge_calibration(Calibration& c, std::span<const PhotoTargets> photos, int contradicting_bars) {
   std::size_t placed = 0, few = 0;
   for (const CalibratedPhoto& p : c.photos) placed += p.part == 0;
   for (const CalibratedPhoto& p : c.photos) few += p.part == 0 && p.points < 8;
@@ -183,10 +187,12 @@ void judge_calibration(Calibration& c, std::span<const PhotoTargets> photos) {
     doubts.push_back(
         formatted("two halves of the photographs differ by %.1f times what is expected", c.cross_validation_sigma));
   if (c.sigma0 > 3)
-    doubts.push_back(
-        formatted("residuals are %.1f times what the measurements' noise explains: the print is not "
-                  "flat or not to scale, or the lens is not of this model",
-                  c.sigma0));
+    doubts.push_back(formatted(
+        "residuals are %.1f times what the measurements' noise explains: rough or bent paper, a print that is "
+        "not to scale, or a lens that is not of this model; the uncertainties given are enlarged as much",
+        c.sigma0));
+  if (contradicting_bars > 0)
+    doubts.push_back(formatted("%d of the scale bars can't be true together with the rest", contradicting_bars));
   if (few > 0) doubts.push_back(formatted("%zu photographs rest on fewer than eight points", few));
   if (c.rms_px > 1) doubts.push_back(formatted("the residuals are %.2f px", c.rms_px));
   for (std::size_t k = 0; k < c.cameras.size(); ++k) {
@@ -199,14 +205,16 @@ void judge_calibration(Calibration& c, std::span<const PhotoTargets> photos) {
       doubts.push_back("the focal length is weak");
     }
   }
-  std::string rare;
-  int count = 0;
-  for (const CalibratedBody& b : c.bodies)
-    if (b.placed && b.photos < 3 && ++count <= 5) rare += (count > 1 ? ", " : "") + b.name;
-  if (count > 0)
-    c.warnings.push_back(
-        formatted("%d of the targets are seen in fewer than three photographs, so nothing checks them: ", count) +
-        rare + (count > 5 ? ", …" : ""));
+  for (const int times : {2, 1}) {
+    std::string rare;
+    int count = 0;
+    for (const CalibratedBody& b : c.bodies)
+      if (b.placed && b.photos == times && ++count <= 5) rare += (count > 1 ? ", " : "") + b.name;
+    if (count > 0)
+      c.warnings.push_back(std::string(times == 2 ? "seen only twice" : "seen only once") +
+                           ": can't be checked, a misread number would not show: " + rare +
+                           (count > 5 ? formatted(" and %d more", count - 5) : ""));
+  }
   std::string figures = formatted("%zu of %zu photographs placed, %.3f px RMS over %.1f %% of the observations", placed,
                                   photos.size(), c.rms_px, 100 * c.share);
   if (c.cross_validation_m >= 0) figures += formatted(", halves agree to %.3f mm", 1000 * c.cross_validation_m);

@@ -27,6 +27,24 @@ TargetSet coded_targets(const std::string& text) {
   return set;
 }
 
+/// A rig's photographs are brought together by counting: one that is missing would shift all that follow.
+void check_rig(const Capture& capture) {
+  std::vector<std::size_t> photos(capture.cameras.size(), 0);
+  for (const Shot& shot : capture.shots) ++photos.at(std::size_t(shot.camera));
+  if (photos.size() < 2)
+    throw Error(ErrorCode::invalid_argument,
+                "expected several cameras, found one: photographs of cameras that write the same EXIF count as one "
+                "camera's",
+                "rig");
+  for (std::size_t c = 1; c < photos.size(); ++c)
+    if (photos[c] != photos[0])
+      throw Error(ErrorCode::invalid_argument,
+                  "expected as many photographs of each camera, for the nth of all are taken for one moment; camera 0 "
+                  "has " +
+                      std::to_string(photos[0]) + ", camera " + std::to_string(c) + " has " + std::to_string(photos[c]),
+                  "rig");
+}
+
 }  // namespace
 
 void store_calibration(Capture& capture, const TargetModel& model) {
@@ -55,12 +73,16 @@ void store_calibration(Capture& capture, const TargetModel& model) {
 }
 
 CalibrateCaptureReport calibrate_capture(Capture& capture, const CalibrateCaptureOptions& options, Job& job) {
-  options.solve.validate();
+  CalibrateOptions solve = options.solve;
+  solve.free_print_scale = solve.free_print_scale && options.bars.empty();  // its bars come after detection
+  solve.validate();
+  solve.free_print_scale = options.solve.free_print_scale;
   CalibrateCaptureReport report;
   TargetModel& model = report.model;
   model.set = coded_targets(options.targets);
   if (capture.shots.empty())
     throw Error(ErrorCode::bad_input, "the capture has no photographs", capture.folder().string());
+  if (solve.rig) check_rig(capture);
   model.starts = camera_starts(capture, options.intrinsics);
   for (const Shot& shot : capture.shots) model.photos.push_back({shot.name, shot.camera});
   capture.refresh_stamps(job);
@@ -75,9 +97,14 @@ CalibrateCaptureReport calibrate_capture(Capture& capture, const CalibrateCaptur
                     "\": is that what was printed, in focus and not too small? `lumihull detect PHOTO --targets … "
                     "--draw FOLDER` shows what is seen",
                 capture.folder().string());
-  if (!options.solve.rig)
+  if (!options.bars.empty()) {
+    const std::vector<CalibratedBody> bodies = bodies_of(model.set, seen.photos);
+    solve.bars.clear();
+    for (const TargetBar& bar : options.bars) solve.bars.push_back(bar_between(bar, model.set, bodies));
+  }
+  if (!solve.rig)
     for (std::size_t i = 0; i < seen.photos.size(); ++i) seen.photos[i].shot = int(i);
-  model.calibration = calibrate_targets(model.set, seen.photos, model.starts, options.solve, job);
+  model.calibration = calibrate_targets(model.set, seen.photos, model.starts, solve, job);
 
   const std::string page = calibration_report_html(capture, model, job);
   Capture stored = capture;

@@ -149,6 +149,13 @@ std::string removed(const TargetModel& model) {
   return out + "</ul></details>\n";
 }
 
+/// What a reader must know of a body beside its figures.
+std::string remark(const CalibratedBody& body) {
+  if (body.part > 0) return "in part " + std::to_string(body.part) + ", whose place in the world is not known";
+  if (!body.placed || body.photos > 2) return "";
+  return std::string(body.photos == 2 ? "seen only twice" : "seen only once") + ": can't be checked";
+}
+
 std::string tables(const TargetModel& model) {
   const Calibration& c = model.calibration;
   std::string out = "<h2>Photographs</h2>\n<details" + std::string(c.photos.size() <= 40 ? " open" : "") +
@@ -166,14 +173,14 @@ std::string tables(const TargetModel& model) {
   out += "</table></div></details>\n<h2>Targets and boards</h2>\n<details" +
          std::string(c.bodies.size() <= 40 ? " open" : "") + "><summary>All " + std::to_string(c.bodies.size()) +
          "</summary><div class=\"scroll\"><table>\n" +
-         cells({"", "name", "model", "points", "photographs", "RMS, px", "points ±"}, "th");
+         cells({"", "name", "model", "points", "photographs", "RMS, px", "points ±", ""}, "th");
   for (std::size_t i = 0; i < c.bodies.size(); ++i) {
     const CalibratedBody& b = c.bodies[i];
     double worst = 0;
     for (const Eigen::Matrix3d& m : b.point_covariances) worst = std::max(worst, report::longest_axis(m));
     out += cells({std::to_string(i), b.name, name_of(b.body.model), std::to_string(b.body.points.size()),
                   std::to_string(b.photos), b.placed ? number("%.4f", b.rms_px) : "not placed",
-                  b.placed ? length(worst) : ""});
+                  b.placed ? length(worst) : "", remark(b)});
   }
   return out + "</table></div></details>\n";
 }

@@ -80,9 +80,11 @@ Json print_body(const CalibratedBody& b) {
   if (b.id >= 0) json["id"] = b.id;
   json["model"] = kModels.at(std::size_t(b.body.model));
   json["placed"] = b.placed;
+  json["part"] = b.part;
   json["photos"] = b.photos;
   json["rms_px"] = b.rms_px;
   if (b.placed) json["world_from_body"] = lumihull::internal::print_pose(b.body.world_from_body);
+  if (b.part > 0 && b.part_from_body) json["part_from_body"] = lumihull::internal::print_pose(*b.part_from_body);
   if (!b.body.bend.isZero(0)) json["bend"] = list(b.body.bend);
   Json points = Json::array();
   for (std::size_t k = 0; k < b.body.points.size(); ++k) points.push_back(print_point(b, k));
@@ -121,7 +123,12 @@ CalibratedBody read_body(const JsonReader& json, const TargetSet& set) {
   b.placed = json.at("placed").boolean();
   b.photos = int(json.at("photos").integer(0, INT32_MAX));
   b.rms_px = json.at("rms_px").number(0);
-  if (b.placed) b.body.world_from_body = lumihull::internal::read_pose(json.at("world_from_body"));
+  b.part = b.placed ? 0 : -1;  // files of before did not say more
+  if (json.has("part")) b.part = int(json.at("part").integer(-1, INT32_MAX));
+  if (b.placed != (b.part == 0))
+    json.at("part").fail(b.placed ? "0, for it is placed" : "another part than 0, for it is not placed");
+  if (b.placed) b.part_from_body = b.body.world_from_body = lumihull::internal::read_pose(json.at("world_from_body"));
+  if (b.part > 0) b.part_from_body = lumihull::internal::read_pose(json.at("part_from_body"));
   if (json.has("bend")) b.body.bend = read_vector<3>(json.at("bend"));
   const JsonReader points = json.at("points");
   const std::size_t n = points.array_size(kMostEntries);

@@ -122,11 +122,13 @@ fs::path ColmapRun::model(Job& job) const {
                                    threads};
   if (known_camera) {
     const auto [name, parameters] = words_of(*known_camera);
-    extract.insert(extract.end(),
-                   {"--ImageReader.camera_model", name, "--ImageReader.camera_params", parameters});
+    extract.insert(extract.end(), {"--ImageReader.camera_model", name, "--ImageReader.camera_params", parameters});
   }
-  step("finding features", photo_count, extract,
-       [](const std::string& line) { return number_behind(line, "Processed file ["); });
+  if (std::error_code ignored; !fs::exists(mark(), ignored)) {
+    step("finding features", photo_count, extract,
+         [](const std::string& line) { return number_behind(line, "Processed file ["); });
+    write_file(mark(), inputs);
+  }
 
   std::uint64_t blocks = 0;
   step("matching features", photo_count,
@@ -143,8 +145,8 @@ fs::path ColmapRun::model(Job& job) const {
          return photo_count * ++blocks / (side * side);
        });
 
-  std::vector<std::string> map{"mapper",    "--database_path", database,
-                               "--image_path", photos.string(),   "--output_path",
+  std::vector<std::string> map{"mapper",        "--database_path",      database,
+                               "--image_path",  photos.string(),        "--output_path",
                                models.string(), "--Mapper.num_threads", threads};
   if (known_camera)
     for (const char* flag : {"--Mapper.ba_refine_focal_length", "--Mapper.ba_refine_extra_params"})
@@ -164,7 +166,8 @@ fs::path ColmapRun::model(Job& job) const {
     throw Error(ErrorCode::degenerate,
                 "COLMAP found no two photographs that show enough of the same: too plain or shiny, too far from "
                 "one another, or without parallax; its words are in " +
-                    (work / "colmap.log").string() + ". Printed targets beside the object help: see `lumihull targets`");
+                    (work / "colmap.log").string() +
+                    ". Printed targets beside the object help: see `lumihull targets`");
   return best;
 }
 

@@ -1,5 +1,7 @@
 // Poses without targets, by COLMAP's features, and what gives them a scale.
 #include <lumihull/base/error.h>
+#include <lumihull/base/export.h>
+#include <lumihull/base/files.h>
 #include <lumihull/base/import.h>
 #include <lumihull/calib/calibrate_capture.h>
 #include <lumihull/calib/feature_poses.h>
@@ -56,7 +58,8 @@ std::map<fs::path, std::size_t> shots_by_path(const Capture& capture) {
   return shots;
 }
 
-/// The point nearest to rays (origin, unit direction) in the least-squares sense; nullopt where they are nearly parallel.
+/// The point nearest to rays (origin, unit direction) in the least-squares sense; nullopt where they are nearly
+/// parallel.
 std::optional<Eigen::Vector3d> nearest_point(const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& rays) {
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
@@ -103,12 +106,19 @@ std::optional<double> scale_by_targets(const Capture& capture, const TargetSet& 
   return std::isfinite(*middle) && *middle > 0 ? std::optional(*middle) : std::nullopt;
 }
 
-/// Removes the folder at the end, all but the log where something failed.
+/// The work of one run. Removes the folder at the end; where something failed all but the log, and a database that
+/// the same inputs can be taken up from.
 class Workshop {
  public:
-  explicit Workshop(fs::path folder) : folder_(std::move(folder)) {
+  explicit Workshop(const ColmapRun& run) : folder_(run.work) {
     std::error_code error;
-    fs::remove_all(folder_, error);
+    bool same = false;
+    if (fs::exists(run.mark(), error) && fs::exists(folder_ / "database.db", error))
+      same = read_file(run.mark()) == run.inputs;
+    if (same)
+      clear();
+    else
+      fs::remove_all(folder_, error);
     fs::create_directories(folder_, error);
     if (error) throw Error(ErrorCode::io, "can't make the folder: " + error.message(), folder_.string());
   }
@@ -116,20 +126,30 @@ class Workshop {
   Workshop& operator=(const Workshop&) = delete;
   ~Workshop() {
     std::error_code ignored;
-    if (done_) {
+    if (done_)
       fs::remove_all(folder_, ignored);
-      return;
-    }
-    for (const char* part : {"photos", "models", "imported", "database.db", "database.db-shm", "database.db-wal"})
-      fs::remove_all(folder_ / part, ignored);
+    else
+      clear();
   }
   const fs::path& folder() const { return folder_; }
   void done() { done_ = true; }
 
  private:
+  void clear() const {
+    std::error_code ignored;
+    for (const char* part : {"photos", "models", "imported"}) fs::remove_all(folder_ / part, ignored);
+  }
   fs::path folder_;
   bool done_ = false;
 };
+
+/// All that features and matches depend on.
+std::string inputs_digest(const Capture& capture, const ColmapRun& run) {
+  std::string text = run.program + (run.sequential ? " sequential\n" : " all pairs\n");
+  if (run.known_camera) text += colmap_camera(*run.known_camera).text;
+  for (const Shot& shot : capture.shots) text += std::to_string(shot.camera) + " " + shot.stamp.sha256 + "\n";
+  return sha256(text);
+}
 
 }  // namespace
 
@@ -140,33 +160,35 @@ std::optional<ScaleDistance> ScaleDistance::from_text(const std::string& text) {
   if (words.size() == 3) {
     out.photo_a = words[0], out.photo_b = words[1];
     const auto [end, error] = std::from_chars(words[2].data(), words[2].data() + words[2].size(), out.metres);
-    if (error == std::errc() && end == words[2].data() + words[2].size() && std::isfinite(out.metres) && out.metres > 0 &&
-        out.photo_a != out.photo_b)
+    if (error == std::errc() && end == words[2].data() + words[2].size() && std::isfinite(out.metres) &&
+        out.metres > 0 && out.photo_a != out.photo_b)
       return out;
   }
-  throw Error(ErrorCode::invalid_argument,
-              "expected NAME_A,NAME_B,METRES: two photographs and the distance of their cameras, found \"" + text + "\"",
-              "scale_distance");
+  throw Error(
+      ErrorCode::invalid_argument,
+      "expected NAME_A,NAME_B,METRES: two photographs and the distance of their cameras, found \"" + text + "\"",
+      "scale_distance");
 }
 
 FeatureReport poses_from_features(Capture& capture, const FeatureOptions& options, Job& job) {
   if (capture.shots.size() < 3)
-    throw Error(ErrorCode::degenerate,
-                "expected at least 3 photographs, found " + std::to_string(capture.shots.size()),
+    throw Error(ErrorCode::degenerate, "expected at least 3 photographs, found " + std::to_string(capture.shots.size()),
                 capture.folder().string());
   std::array<std::size_t, 2> scaled{};
   if (options.scale_distance)
-    scaled = {shot_named(capture, options.scale_distance->photo_a), shot_named(capture, options.scale_distance->photo_b)};
+    scaled = {shot_named(capture, options.scale_distance->photo_a),
+              shot_named(capture, options.scale_distance->photo_b)};
   capture.refresh_stamps(job);
 
-  Workshop workshop(capture.folder() / "features");
   ColmapRun run;
   run.program = options.program;
-  run.photos = workshop.folder() / "photos";
-  run.work = workshop.folder();
+  run.work = capture.folder() / "features";
+  run.photos = run.work / "photos";
   run.photo_count = capture.shots.size();
   run.sequential = options.sequential;
   if (capture.cameras.size() == 1) run.known_camera = camera_starts(capture, {})[0].camera;
+  run.inputs = inputs_digest(capture, run);
+  Workshop workshop(run);
   link_photos(capture, run.photos);
   const fs::path model = run.model(job);
 
@@ -200,7 +222,8 @@ FeatureReport poses_from_features(Capture& capture, const FeatureOptions& option
     const double length = (stored.view(scaled[0]).center() - stored.view(scaled[1]).center()).norm();
     if (!(length > 0)) throw Error(ErrorCode::degenerate, "the photographs that give the scale are from one place");
     report.scale = options.scale_distance->metres / length;
-    std::snprintf(line, sizeof line, "scale from the distance of two photographs, %g m", options.scale_distance->metres);
+    std::snprintf(line, sizeof line, "scale from the distance of two photographs, %g m",
+                  options.scale_distance->metres);
     report.said.emplace_back(line);
   } else if (options.targets) {
     std::size_t targets = 0;

@@ -201,8 +201,38 @@ TEST(CalibrateTargets, PartsThatShareNothingAreBothKept) {
     // Poses of two frames must not be taken for one world's.
     EXPECT_EQ(c.photos[i].cam_from_world.has_value(), i < 40) << i;
   }
+  // So do targets; their distances within a part are the truth's.
+  for (const bool first : {true, false}) {
+    const CalibratedBody* before = nullptr;
+    for (const CalibratedBody& b : c.bodies) {
+      if ((b.id % 4 < 2) == first || !b.part_from_body) continue;
+      EXPECT_EQ(b.part, first ? 0 : 1) << b.name;
+      EXPECT_EQ(b.placed, first) << b.name;
+      if (before) {
+        const auto& truth = capture.world_from_target;
+        EXPECT_NEAR((b.part_from_body->translation - before->part_from_body->translation).norm(),
+                    (truth[std::size_t(b.id)].translation - truth[std::size_t(before->id)].translation).norm(), 1e-3);
+      }
+      before = &b;
+    }
+    ASSERT_NE(before, nullptr);
+  }
   EXPECT_GE(removed_as(c, Removed::Kind::photo, Removed::Why::not_connected).size(), 18u);
   EXPECT_THAT(c.verdict, HasSubstr("of 60 photographs have no pose"));
+}
+
+TEST(CalibrateTargets, ATargetThatIsSeenTwiceCantBeChecked) {
+  SimulatedOptions o;
+  o.photos = 24;
+  SimulatedCapture capture = simulate_capture(o);
+  EXPECT_THAT(calibrate(capture).warnings, testing::Not(testing::Contains(HasSubstr("matrix5x5 6"))));
+  int seen = 0;
+  for (PhotoTargets& p : capture.photos)
+    std::erase_if(p.targets, [&](const Detection& d) { return d.id == 6 && ++seen > 2; });
+  ASSERT_GT(seen, 2);
+  EXPECT_THAT(
+      calibrate(capture).warnings,
+      testing::Contains(testing::AllOf(HasSubstr("seen only twice: can't be checked"), HasSubstr("matrix5x5 6"))));
 }
 
 TEST(CalibrateTargets, OrderAndThreadsDoNotMatter) {
@@ -219,6 +249,31 @@ TEST(CalibrateTargets, OrderAndThreadsDoNotMatter) {
   const Calibration back = calibrate(turned);
   for (std::size_t i = 0; i < 24; ++i)
     EXPECT_LT((one.photos[i].cam_from_world->center() - back.photos[23 - i].cam_from_world->center()).norm(), 1e-7);
+}
+
+TEST(CalibrateTargets, UncertaintiesAreThoseOfTheResiduals) {
+  // The same measurements, their noise once as it is and once said to be a quarter of it.
+  SimulatedOptions o;
+  o.noise_px = 0.2;
+  SimulatedCapture capture = simulate_capture(o);
+  CalibrateOptions options;
+  options.model_photos = 40;
+  const Calibration honest = calibrate(capture, false, options);
+  for (PhotoTargets& p : capture.photos)
+    for (Detection& d : p.targets)
+      for (Feature& f : d.features) f.covariance /= 16;
+  const Calibration boasting = calibrate(capture, false, options);
+  EXPECT_NEAR(honest.sigma0, 1, 0.05);
+  EXPECT_NEAR(boasting.sigma0, 4, 0.2);
+  EXPECT_THAT(boasting.verdict, HasSubstr("the uncertainties given are enlarged as much"));
+  for (std::size_t i = 0; i < honest.photos.size(); ++i) {
+    const CalibratedPhoto &a = honest.photos[i], &b = boasting.photos[i];
+    ASSERT_TRUE(a.cam_from_world && b.cam_from_world) << i;
+    // A single photograph's own residuals may enlarge its resection's covariance further.
+    EXPECT_NEAR(b.covariance.trace() / a.covariance.trace(), 1, 0.15) << i << (a.in_model ? " adjusted" : " resected");
+  }
+  EXPECT_NEAR(boasting.camera_covariances[0](0, 0) / honest.camera_covariances[0](0, 0), 1, 0.15);
+  EXPECT_NEAR(boasting.bodies[3].point_covariances[0].trace() / honest.bodies[3].point_covariances[0].trace(), 1, 0.15);
 }
 
 TEST(CalibrateTargets, TheRestIsPlacedByResection) {

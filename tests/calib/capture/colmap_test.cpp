@@ -8,10 +8,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <numbers>
 #include <sstream>
 
+#include "alignment.h"
 #include "printed_scene.h"
 #include "support.h"
 
@@ -68,8 +71,8 @@ TEST(Colmap, ReadsAdjustsAndTriangulatesWhatIsExported) {
 
   // With the poses that it is given, adjusting changes next to nothing: circles' centres are where it expects points.
   fs::create_directories(folder / "adjusted");
-  const auto adjusted = run_colmap("bundle_adjuster --input_path '" + (folder / "model").string() + "' --output_path '" +
-                                       (folder / "adjusted").string() + "'",
+  const auto adjusted = run_colmap("bundle_adjuster --input_path '" + (folder / "model").string() +
+                                       "' --output_path '" + (folder / "adjusted").string() + "'",
                                    folder / "log");
   ASSERT_TRUE(adjusted.has_value()) << read_file(folder / "log");
   EXPECT_TRUE(fs::exists(folder / "adjusted/images.bin"));
@@ -124,8 +127,8 @@ TEST(Colmap, ReadsAdjustsAndTriangulatesWhatIsExported) {
                          folder / "log"))
       << read_file(folder / "log");
   fs::create_directories(folder / "triangulated");
-  ASSERT_TRUE(run_colmap("point_triangulator --clear_points 1 --database_path '" + database + "' --image_path '" + images +
-                             "' --input_path '" + (folder / "model").string() + "' --output_path '" +
+  ASSERT_TRUE(run_colmap("point_triangulator --clear_points 1 --database_path '" + database + "' --image_path '" +
+                             images + "' --input_path '" + (folder / "model").string() + "' --output_path '" +
                              (folder / "triangulated").string() + "'",
                          folder / "log"))
       << read_file(folder / "log");
@@ -145,7 +148,8 @@ TEST(Features, WhatIsWrongIsSaidInWords) {
   EXPECT_EQ(scale->metres, 0.25);
   EXPECT_EQ(ScaleDistance::from_text("a b 2")->photo_b, "b");
   for (const char* wrong : {"a", "a b", "a,b,-1", "a,b,0", "a,b,1m", "a,a,1", "a,b,nan", "a b c 1"})
-    EXPECT_EQ(test::expect_error([&] { ScaleDistance::from_text(wrong); }).code(), ErrorCode::invalid_argument) << wrong;
+    EXPECT_EQ(test::expect_error([&] { ScaleDistance::from_text(wrong); }).code(), ErrorCode::invalid_argument)
+        << wrong;
 
   const test::TemporaryFolder folder;
   const test::PrintedScene scene = test::print_scene(folder.path(), "matrix5x5:18mm", 3);
@@ -195,8 +199,10 @@ fs::path stand_in(const fs::path& folder, const test::PrintedScene& scene, doubl
   write_file(model / "cameras.bin", cameras);
   write_file(model / "images.bin", images);
   const fs::path script = folder / "stand_in.sh";
-  write_file(script, "#!/bin/sh\n[ $1 = mapper ] || exit 0\nwhile [ $1 != --output_path ]; do shift; done\n"
-                     "mkdir $2/0 && cp '" + model.string() + "'/*.bin $2/0\n");
+  write_file(script,
+             "#!/bin/sh\n[ $1 = mapper ] || exit 0\nwhile [ $1 != --output_path ]; do shift; done\n"
+             "mkdir $2/0 && cp '" +
+                 model.string() + "'/*.bin $2/0\n");
   fs::permissions(script, fs::perms::owner_all);
   return script;
 }
@@ -242,6 +248,42 @@ TEST(Features, TakesOverTheModelAndGivesItAScale) {
   EXPECT_NEAR(report.scale.value_or(0), 2.5, 0.025) << "the stand-in has no lens distortion, the pictures do";
 }
 
+TEST(Features, AStoppedRunGoesOnWithItsDatabase) {
+  const test::TemporaryFolder folder;
+  const test::PrintedScene scene = test::print_scene(folder.path(), "matrix5x5:18mm", 4);
+  Capture capture = imported(scene, folder / "capture");
+  Job job;
+  FeatureOptions options;
+  // A stand-in that notes its commands, and whose matcher fails once.
+  const fs::path inner = stand_in(folder.path(), scene, 1, 4), script = folder / "noting.sh", notes = folder / "notes";
+  write_file(script, "#!/bin/sh\necho $1 >> '" + notes.string() +
+                         "'\n[ $1 = feature_extractor ] && : > \"$3\"\n[ $1 = " + "exhaustive_matcher ] && [ ! -e '" +
+                         (folder / "once").string() + "' ] && : > '" + (folder / "once").string() +
+                         "' && exit 3\nexec '" + inner.string() + "' \"$@\"\n");
+  fs::permissions(script, fs::perms::owner_all);
+  options.program = script.string();
+  EXPECT_THAT(test::expect_error([&] { poses_from_features(capture, options, job); }).message(),
+              HasSubstr("exhaustive_matcher failed with status 3"));
+  EXPECT_TRUE(fs::exists(capture.folder() / "features/database.db"));
+  EXPECT_FALSE(fs::exists(capture.folder() / "features/photos"));
+  EXPECT_EQ(poses_from_features(capture, options, job).placed, 4u);
+  EXPECT_EQ(read_file(notes), "feature_extractor\nexhaustive_matcher\nexhaustive_matcher\nmapper\n");
+  EXPECT_FALSE(fs::exists(capture.folder() / "features"));
+
+  // Another way of matching, or another photograph, is another database.
+  for (const bool photo : {false, true}) {
+    SCOPED_TRACE(photo);
+    fs::remove(folder / "once");
+    options.sequential = false;
+    EXPECT_EQ(test::expect_error([&] { poses_from_features(capture, options, job); }).code(), ErrorCode::io);
+    options.sequential = !photo;
+    if (photo) write_png(capture.photo_path(capture.shots[1]), Image(640, 480, 3));
+    fs::remove(notes);
+    poses_from_features(capture, options, job);
+    EXPECT_THAT(read_file(notes), HasSubstr("feature_extractor\n"));
+  }
+}
+
 TEST(Features, TempleIsPlaced) {
   NEEDS_COLMAP();
   LUMIHULL_NEED_REAL_DATA(temple, "temple");
@@ -255,8 +297,8 @@ TEST(Features, TempleIsPlaced) {
   const FeatureReport report = poses_from_features(capture, {}, job);
   EXPECT_GE(report.placed, 8u);
   EXPECT_EQ(capture.unit, Unit::unknown);
-  // What COLMAP makes of it is COLMAP's: most distances between cameras agree up to the scale, which is what a wrong
-  // order, a transform the other way round or another camera's pose would not leave.
+  // What COLMAP makes of it is COLMAP's, and its mapper draws lots: most distances between cameras agree up to the
+  // scale, which is what a wrong order, a transform the other way round or another camera's pose would not leave.
   std::vector<std::pair<double, double>> lengths;
   std::vector<double> ratios;
   double longest = 0;
@@ -271,10 +313,33 @@ TEST(Features, TempleIsPlaced) {
   ASSERT_FALSE(ratios.empty());
   std::nth_element(ratios.begin(), ratios.begin() + std::ptrdiff_t(ratios.size() / 2), ratios.end());
   const double scale = ratios[ratios.size() / 2];
-  const auto near = std::count_if(lengths.begin(), lengths.end(), [&](const auto& l) {
-    return std::abs(l.first / scale - l.second) < 0.05 * longest;
-  });
+  const auto near = std::count_if(lengths.begin(), lengths.end(),
+                                  [&](const auto& l) { return std::abs(l.first / scale - l.second) < 0.05 * longest; });
   EXPECT_GT(double(near), 0.7 * double(lengths.size()));
+
+  // Turned, moved and scaled onto the truth by the cameras' centres: how far off the rest is.
+  std::vector<Eigen::Vector3d> found, true_centers;
+  for (std::size_t i = 0; i < truth.shots.size(); ++i)
+    if (capture.positioned(i))
+      found.push_back(capture.view(i).center()), true_centers.push_back(truth.view(i).center());
+  const test::Alignment aligned = test::align_points(found, true_centers, false);
+  std::vector<double> angles, offsets;
+  for (std::size_t i = 0; i < truth.shots.size(); ++i) {
+    if (!capture.positioned(i)) continue;
+    const Eigen::Quaterniond turned = capture.shots[i].cam_from_world->rotation * aligned.motion.rotation.conjugate();
+    angles.push_back(180 / std::numbers::pi * turned.angularDistance(truth.shots[i].cam_from_world->rotation));
+    const double distance = true_centers[offsets.size()].norm();  // the object stands about the origin
+    offsets.push_back((aligned.motion * (aligned.scale * found[offsets.size()]) - true_centers[offsets.size()]).norm() /
+                      distance);
+  }
+  std::sort(angles.begin(), angles.end()), std::sort(offsets.begin(), offsets.end());
+  std::printf(
+      "temple: %zu of %zu placed; directions off by %.2f degrees (median; %.2f most), centres by %.2f %% of their "
+      "distance (%.2f most)\n",
+      report.placed, truth.shots.size(), angles[angles.size() / 2], angles.back(), 100 * offsets[offsets.size() / 2],
+      100 * offsets.back());
+  EXPECT_LT(angles[angles.size() / 2], 5);
+  EXPECT_LT(offsets[offsets.size() / 2], 0.1);
 }
 
 }  // namespace

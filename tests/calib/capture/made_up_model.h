@@ -44,6 +44,7 @@ inline calib::TargetModel made_up_model(int photos = 8, int targets = 4) {
     if (t == 1) body.body.bend = {0.1, 0, -0.05};
     body.body.name = body.name;
     const double turn = 2 * std::numbers::pi * t / targets;
+    if (body.placed) body.part = 0;
     if (body.placed)
       body.body.world_from_body = {Eigen::Quaterniond(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitX())),
                                    {0.3 * std::cos(turn), 0.3 * std::sin(turn), 0.01 * t}};

@@ -22,6 +22,9 @@ TEST(TargetModel, ReadsWhatItWrote) {
   // A photograph of a smaller part: its pose is in that part's frame.
   model.calibration.photos[2].part = 1;
   model.calibration.photos[2].cam_from_part = Pose{Eigen::Quaterniond::Identity(), {0.25, -0.5, 1}};
+  ASSERT_FALSE(model.calibration.bodies[3].placed);
+  model.calibration.bodies[3].part = 1;
+  model.calibration.bodies[3].part_from_body = Pose{Eigen::Quaterniond(0, 1, 0, 0), {0.5, 0.25, 2}};
   model.save(folder / "targets.json");
   const TargetModel again = TargetModel::load(folder / "targets.json");
   EXPECT_EQ(internal::print_target_model(again, "again"), read_file(folder / "targets.json"));
@@ -38,6 +41,12 @@ TEST(TargetModel, ReadsWhatItWrote) {
   ASSERT_TRUE(b.photos[2].cam_from_part.has_value());
   EXPECT_EQ(b.photos[2].cam_from_part->translation, Eigen::Vector3d(0.25, -0.5, 1));
   EXPECT_FALSE(b.photos[2].cam_from_world.has_value());
+  EXPECT_EQ(b.bodies[0].part, 0);
+  EXPECT_EQ(b.bodies[0].part_from_body->translation, a.bodies[0].body.world_from_body.translation);
+  EXPECT_EQ(b.bodies[3].part, 1);
+  ASSERT_TRUE(b.bodies[3].part_from_body.has_value());
+  EXPECT_EQ(b.bodies[3].part_from_body->translation, Eigen::Vector3d(0.5, 0.25, 2));
+  EXPECT_EQ(b.bodies[3].part_from_body->rotation.coeffs(), Eigen::Quaterniond(0, 1, 0, 0).coeffs());
   ASSERT_EQ(b.removed.size(), 3u);
   EXPECT_EQ(b.removed[0].photo, 1);
   EXPECT_EQ(b.removed[0].feature, 7);
@@ -76,6 +85,9 @@ TEST(TargetModel, WrongFieldsAreNamedByPointer) {
   complaint("/bodies/0/points/3/covariance", {1, 2, 0, 1, 0, 1});
   complaint("/bodies/0/points/3/covariance", {1, 0, 0, 1, 0});
   complaint("/bodies/0/world_from_body/q", {1, 1, 0, 0});
+  complaint("/bodies/0/part", 1);
+  complaint("/bodies/3/part", 0);
+  complaint("/bodies/3/part", -2);
   complaint("/removed/0/photo", "p9");
   complaint("/removed/0/body", 4);
   complaint("/removed/0/why", "because");
@@ -88,6 +100,16 @@ TEST(TargetModel, WrongFieldsAreNamedByPointer) {
     EXPECT_EQ(test::expect_error([&] { internal::parse_target_model(wrong.dump(), "t"); }).code(), ErrorCode::bad_input)
         << item.key();
   }
+}
+
+TEST(TargetModel, FilesFromBeforeBodiesHadPartsAreRead) {
+  Json old = Json::parse(internal::print_target_model(test::made_up_model(), "old"));
+  for (auto& body : old["bodies"]) body.erase("part");
+  const TargetModel model = internal::parse_target_model(old.dump(), "old");
+  EXPECT_EQ(model.calibration.bodies[0].part, 0);
+  EXPECT_TRUE(model.calibration.bodies[0].part_from_body.has_value());
+  EXPECT_EQ(model.calibration.bodies[3].part, -1);
+  EXPECT_FALSE(model.calibration.bodies[3].part_from_body.has_value());
 }
 
 TEST(TargetModel, WhatCouldNotBeReadAgainIsNotWritten) {

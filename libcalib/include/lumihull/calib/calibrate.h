@@ -96,8 +96,11 @@ struct CalibratedBody {
     int design = 0, id = 0, feature = 0;
   };
   std::vector<PointName> features;
-  AdjustedBody body;  ///< printed points, pose, bend
-  bool placed = false;
+  AdjustedBody body;    ///< printed points, pose, bend
+  bool placed = false;  ///< in the world: it belongs to part 0
+  int part = -1;        ///< which connected part of the photographs it was solved with; 0: the largest; -1: none
+  /// As printed to the frame of its part, whose place in the world nothing tells; of part 0: body.world_from_body.
+  std::optional<Pose> part_from_body;
   std::vector<Eigen::Vector3d> points;             ///< in the world, m
   std::vector<Eigen::Matrix3d> point_covariances;  ///< m²
   int photos = 0;                                  ///< that count it

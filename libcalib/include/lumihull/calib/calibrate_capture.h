@@ -5,6 +5,7 @@
 #include <lumihull/base/job.h>
 #include <lumihull/calib/calibrate.h>
 #include <lumihull/calib/detect_capture.h>
+#include <lumihull/calib/target_bar.h>
 #include <lumihull/calib/target_model.h>
 
 #include <cstddef>
@@ -21,6 +22,8 @@ struct CalibrateCaptureOptions {
   /// camera_starts.
   std::filesystem::path intrinsics;
   CaptureDetectOptions detect;
+  std::vector<TargetBar> bars;  ///< in place of solve.bars, which names bodies that are known only after detection
+  /// rig: the nth photograph of each camera, in the capture's order, is of the nth moment.
   CalibrateOptions solve;
 };
 
@@ -40,7 +43,8 @@ struct CalibrateCaptureReport {
 /// photograph, the cameras' intrinsics and the targets' places (calibrate_targets). Stores cameras, poses and how well
 /// they are known in the capture (unit: metres) and saves it, then writes targets.json and calibration.html. Poses that
 /// were there are replaced; a photograph that can't be placed loses its own. The files change only after everything was
-/// computed. Errors: invalid_argument (targets, options), degenerate (no target found, nothing can be placed), io,
+/// computed. Errors: invalid_argument (targets, options, bars; rig: cameras that have not
+/// as many photographs), degenerate (no target found, nothing can be placed), io,
 /// cancelled, and those of the functions named.
 LUMIHULL_API CalibrateCaptureReport calibrate_capture(Capture& capture, const CalibrateCaptureOptions& options,
                                                       Job& job);

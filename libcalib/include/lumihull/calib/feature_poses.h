@@ -37,9 +37,11 @@ struct FeatureReport {
 /// Poses and cameras of a capture without targets: drives the program COLMAP (feature_extractor, a matcher, mapper; on
 /// the CPU) as a child process and takes over its largest model. A single camera whose intrinsics are known
 /// (camera_starts) keeps them. Stores poses and cameras in the capture and saves it; a targets.json of before is
-/// removed, for it would be of another world. A failed run leaves the program's words in features/colmap.log.
-/// Errors: not_found (the program), degenerate (fewer than three photographs, or nothing that they agree on),
-/// invalid_argument (scale_distance of photographs that are not there), unsupported (a lens), io, cancelled.
+/// removed, for it would be of another world. A run that failed or was stopped leaves the program's words in
+/// features/colmap.log, and once all features are found also its database, which a run of the same photographs goes on
+/// with; a run that ends removes both. Errors: not_found (the program), degenerate (fewer than three photographs, or
+/// nothing that they agree on), invalid_argument (scale_distance of photographs that are not there), unsupported (a
+/// lens), io, cancelled.
 LUMIHULL_API FeatureReport poses_from_features(Capture& capture, const FeatureOptions& options, Job& job);
 
 }  // namespace lumihull::calib

@@ -36,6 +36,7 @@ struct OptionSpec {
   std::vector<std::string> choices = {};  ///< of a string; empty: any
   bool path = false;  ///< of a string that is none of `choices`: a file or folder; set_option makes it absolute
   bool word = false;  ///< of a path: a text that is no file and does not end with ".json" is a word, kept as it is
+  bool several = false;  ///< of a string: parts separated by semicolons; at the command line the flag may be repeated
 };
 
 /// Errors: invalid_argument (no such stage).
