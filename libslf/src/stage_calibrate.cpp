@@ -13,6 +13,7 @@ namespace lumihull::slf {
 
 namespace {
 
+constexpr const char* kAuto = "auto";
 const calib::CalibrateCaptureOptions kDefaults;
 const calib::CalibrateOptions& kSolve = kDefaults.solve;
 
@@ -50,7 +51,9 @@ calib::CalibrateCaptureOptions options_of(const Capture& capture) {
   o.detect.ink_key = effective<std::string>(capture, "calibrate", "ink_key");
   o.detect.min_circle_px = effective<double>(capture, "calibrate", "min_circle_px");
   o.solve.refine_intrinsics = intrinsics == "refine";
-  o.solve.free = free_of(effective<std::string>(capture, "calibrate", "free"));
+  const auto free = effective<std::string>(capture, "calibrate", "free");
+  o.solve.more_if_needed = free == kAuto;
+  if (free != kAuto) o.solve.free = free_of(free);
   const auto model = effective<std::string>(capture, "calibrate", "model");
   o.solve.model = model == "rigid"     ? calib::BodyModel::rigid
                   : model == "bending" ? calib::BodyModel::bending
@@ -178,7 +181,10 @@ const StageDefinition& calibrate_stage() {
            0,
            {"refine", "fixed"},
            true},
-          {"free", "parameters that are refined, of f, s, skew, u0, v0, k1, k2, k3, p1, p2", free_text(kSolve.free)},
+          {"free",
+           "parameters that are refined, of f, s, skew, u0, v0, k1, k2, k3, p1, p2; auto: " + free_text(kSolve.free) +
+               ", and s and k3 where the residuals ask for them",
+           std::string(kAuto)},
           {"model",
            "what paper does: rigid (as printed), bending (curved sheets), free (each point on its own)",
            std::string(calib::name_of(kSolve.model)),

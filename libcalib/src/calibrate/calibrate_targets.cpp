@@ -25,7 +25,9 @@ using Eigen::Vector3d;
 
 constexpr double kRobust = 3;  // scale of the loss, in units of the residuals' own
 constexpr int kMostParts = 100;
-constexpr double kSheet = 0.02;  // points whose RMS distance from a plane is below this share of their extent
+constexpr double kAsksForMore = 50;  // five standard deviations of each of two parameters
+constexpr double kFarAway = 1e3;     // scales of the loss, for what can't be predicted
+constexpr double kSheet = 0.02;      // points whose RMS distance from a plane is below this share of their extent
 
 [[noreturn]] void invalid(const std::string& message, const std::string& subject) {
   throw Error(ErrorCode::invalid_argument, message, subject);
@@ -98,6 +100,34 @@ std::optional<Settled> settle_robustly(Network& n, int part, int rounds, Job& jo
   return settled;
 }
 
+/// Σ log(1 + r² / c²) c², the Cauchy loss of what counts in a part, c in standard deviations.
+double robust_cost(const Network& n, int part, double c) {
+  double sum = 0;
+  for (const Seen& s : n.seen) {
+    if (!s.counts || n.photo_part[std::size_t(s.photo)] != part || n.body_part[std::size_t(s.body)] != part) continue;
+    const auto error = error_of(n, s);
+    const double r = error ? in_sigmas(s, *error) / c : kFarAway;
+    sum += c * c * std::log1p(r * r);
+  }
+  return sum;
+}
+
+/// Frees s and k3, too, where that lowers the loss by more than two parameters do by chance.
+void free_more_if_needed(Network& n, int part, CalibrateOptions& options, Job& job) {
+  const auto free = free_now(n, part, options, false);
+  if (!options.more_if_needed || !options.refine_intrinsics || free != options.free) return;
+  CalibrateOptions wider = options;
+  wider.free[std::size_t(Intrinsic::s)] = wider.free[std::size_t(Intrinsic::k3)] = true;
+  if (wider.free == options.free) return;
+  const Network before = n;
+  const double scale = std::max(1.0, residual_scale(n, part)), c = kRobust * scale;
+  const double cost = robust_cost(n, part, c);
+  if (settle_robustly(n, part, 6, job, wider.free) && cost - robust_cost(n, part, c) > kAsksForMore * scale * scale)
+    options.free = wider.free;
+  else
+    n = before;
+}
+
 /// The largest part gets number 0; a single photograph beside it is no part. Returns how many there are.
 int number_parts(Network& n, int parts) {
   std::vector<int> photos(std::size_t(parts), 0), order(std::size_t(parts), 0), number(std::size_t(parts), 0);
@@ -124,10 +154,11 @@ int number_parts(Network& n, int parts) {
   return kept;
 }
 
-/// Adjusts, judges and looks again until nothing changes.
-void clean(Network& n, int part, const CalibrateOptions& options, Job& job) {
+/// Adjusts, judges and looks again until nothing changes. options.free may grow.
+void clean(Network& n, int part, CalibrateOptions& options, Job& job) {
   for (int round = 0; round < 10; ++round) {
     if (!settle_robustly(n, part, round == 0 ? 6 : 2, job, free_now(n, part, options, false))) return;
+    if (round == 0 && part == 0) free_more_if_needed(n, part, options, job);
     double scale = 1;
     const int changed = judge(n, part, options.outlier_sigma, &scale);
     bool other = false;
@@ -275,8 +306,9 @@ void CalibrateOptions::validate() const {
 }
 
 Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets> photos,
-                              std::span<const CameraStart> cameras, const CalibrateOptions& options, Job& job) {
-  check(set, photos, cameras, options);
+                              std::span<const CameraStart> cameras, const CalibrateOptions& wanted, Job& job) {
+  check(set, photos, cameras, wanted);
+  CalibrateOptions options = wanted;
   Network n = make_network(set, photos);
   Calibration c;
   if (n.sightings.empty())

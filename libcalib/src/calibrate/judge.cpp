@@ -15,6 +15,7 @@ namespace lumihull::calib::network {
 namespace {
 
 constexpr double kMedianOfRayleigh = 1.1774;
+constexpr double kMisfit_px = 1;         // a photograph that is off by less as a whole is the model's fault
 constexpr double kMostOff = 0.5;         // of a detection's points: then it is the detection that is wrong
 constexpr double kClearlyBetter = 0.7;   // of the clipped cost
 constexpr std::size_t kSecondPlace = 3;  // detections that must agree on another place
@@ -23,6 +24,29 @@ constexpr double kInOrder = 0.9;         // of the photographs before and after 
 double clipped_cost(const Network& n, const Sighting& s, const Pose& cam_from_body) {
   const double off = rough_distance(n, s, cam_from_body);
   return std::min(1.0, off * off);
+}
+
+/// Scale of each photograph's own residuals, in units of their covariances', where as a whole they are small: what a
+/// model of the lens leaves over grows where few photographs look, and they must not be taken for outliers one by one
+/// until the others agree with a wrong camera. 0 for all others.
+std::vector<double> own_scales(const Network& n, int part, const std::vector<double>& sigmas,
+                               const std::vector<double>& off_px) {
+  std::vector<std::vector<double>> in_sigma(n.photos.size()), in_px(n.photos.size());
+  for (std::size_t k = 0; k < n.seen.size(); ++k) {
+    const auto photo = std::size_t(n.seen[k].photo);
+    if (n.photo_part[photo] != part || !(sigmas[k] >= 0)) continue;
+    in_sigma[photo].push_back(sigmas[k]);
+    in_px[photo].push_back(off_px[k]);
+  }
+  const auto median = [](std::vector<double>& values) {
+    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  std::vector<double> scales(n.photos.size(), 0);
+  for (std::size_t i = 0; i < scales.size(); ++i)
+    if (!in_px[i].empty() && median(in_px[i]) < kMisfit_px) scales[i] = median(in_sigma[i]) / kMedianOfRayleigh;
+  return scales;
 }
 
 }  // namespace
@@ -40,18 +64,20 @@ double residual_scale(const Network& n, int part) {
 }
 
 int judge(Network& n, int part, double outlier_sigma, double* scale) {
-  std::vector<double> off(n.seen.size(), -1);
+  std::vector<double> off(n.seen.size(), -1), off_px(n.seen.size(), -1);
   for (std::size_t k = 0; k < n.seen.size(); ++k) {
     const Seen& s = n.seen[k];
     if (n.photo_part[std::size_t(s.photo)] != part || n.body_part[std::size_t(s.body)] != part) continue;
     const auto error = error_of(n, s);
     off[k] = error ? in_sigmas(s, *error) : std::numeric_limits<double>::infinity();
+    off_px[k] = error ? error->norm() : std::numeric_limits<double>::infinity();
   }
   *scale = std::max(1.0, residual_scale(n, part));
-  const double limit = outlier_sigma * *scale;
+  const std::vector<double> own = own_scales(n, part, off, off_px);
   int changed = 0;
   for (Sighting& sighting : n.sightings) {
     if (n.photo_part[std::size_t(sighting.photo)] != part || n.body_part[std::size_t(sighting.body)] != part) continue;
+    const double limit = outlier_sigma * std::max(*scale, own[std::size_t(sighting.photo)]);
     std::map<int, std::pair<int, int>> detections;  // (beyond the limit, all)
     for (const std::uint32_t k : sighting.seen) {
       auto& [beyond, all] = detections[n.seen[k].detection];

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
+#include <utility>
 
 #include "lens/point_term.h"
 
@@ -64,6 +66,57 @@ Eigen::Vector2d circle_offset(const Network& n, const Seen& seen) {
   return ellipse - center;
 }
 
+/// Of what takes part, the largest piece that hangs together by what counts; the rest leaves the part, to be placed
+/// again or named. True where something left.
+bool keep_connected(Network& n, const std::vector<bool>& taken, bool by_points, bool rig, std::vector<bool>& photo_in,
+                    std::vector<bool>& body_in) {
+  const std::size_t photos = n.photos.size();
+  std::vector<std::size_t> parent(photos);
+  std::iota(parent.begin(), parent.end(), std::size_t(0));
+  const auto root = [&](std::size_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  std::map<std::pair<int, int>, std::size_t> first_of_body;
+  std::map<int, std::size_t> first_of_shot;
+  const auto join = [&](auto& first, const auto& key, std::size_t photo) {
+    const auto [it, fresh] = first.try_emplace(key, photo);
+    if (!fresh) parent[root(photo)] = root(it->second);
+  };
+  for (std::size_t k = 0; k < n.seen.size(); ++k) {
+    const Seen& s = n.seen[k];
+    const auto photo = std::size_t(s.photo);
+    if (!taken[k] || !photo_in[photo] || !body_in[std::size_t(s.body)]) continue;
+    join(first_of_body, std::pair(s.body, by_points ? s.point : 0), photo);
+    if (rig) join(first_of_shot, n.photos[photo].shot, photo);
+  }
+  std::vector<int> size(photos, 0);
+  for (std::size_t i = 0; i < photos; ++i)
+    if (photo_in[i]) ++size[root(i)];
+  const auto largest = std::size_t(std::max_element(size.begin(), size.end()) - size.begin());
+  std::vector<bool> body_stays(n.bodies.size(), false);
+  for (const auto& [body, photo] : first_of_body)
+    if (root(photo) == largest) body_stays[std::size_t(body.first)] = true;
+  bool left = false;
+  for (std::size_t i = 0; i < photos; ++i)
+    if (photo_in[i] && root(i) != largest) {
+      photo_in[i] = false, left = true;
+      n.photo_part[i] = -1, n.cam_from_world[i].reset();
+    }
+  if (!left) return false;
+  for (std::size_t b = 0; b < body_in.size(); ++b)
+    if (body_in[b] && !body_stays[b]) {
+      body_in[b] = false;
+      n.body_part[b] = -1, n.bodies[b].placed = false;
+    }
+  for (Sighting& sighting : n.sightings)  // judged from where they no longer are
+    if (n.photo_part[std::size_t(sighting.photo)] < 0 || n.body_part[std::size_t(sighting.body)] < 0) {
+      sighting.counts = true;
+      for (const std::uint32_t k : sighting.seen) n.seen[k].counts = true;
+    }
+  return true;
+}
+
 }  // namespace
 
 std::optional<Settled> settle(Network& n, int part, const std::vector<bool>& use, const SettleOptions& options,
@@ -101,6 +154,7 @@ std::optional<Settled> settle(Network& n, int part, const std::vector<bool>& use
       if (photo_in[i] && by_photo[i] < kLeastPoints) photo_in[i] = false, changed = true;
     for (std::size_t b = 0; b < body_in.size(); ++b)
       if (body_in[b] && by_body[b] < kLeastPoints) body_in[b] = false, changed = true;
+    if (!changed) changed = keep_connected(n, taken, options.model == BodyModel::free, options.rig, photo_in, body_in);
   }
 
   Adjustment problem;

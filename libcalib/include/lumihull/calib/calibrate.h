@@ -38,6 +38,9 @@ struct LUMIHULL_API CalibrateOptions {
   /// Intrinsics are refined in the adjustment; else those of CameraStart::camera are kept, and must be there.
   bool refine_intrinsics = true;
   std::array<bool, kIntrinsics> free{true, false, false, true, true, true, true, false, true, true};  ///< by Intrinsic
+  /// s and k3 are refined, too, where the residuals clearly ask for them: a lens that has them would otherwise push out
+  /// good photographs, for what a few terms leave over is a hundred times what targets are measured to.
+  bool more_if_needed = true;
   BodyModel model = BodyModel::rigid;  ///< of targets and boards
   bool rig = false;                    ///< several cameras are fixed to each other; `shot` says what belongs together
   /// Photographs that the model of the targets is made from, the rest is placed by resection (paper, 3.1); 0: all.
