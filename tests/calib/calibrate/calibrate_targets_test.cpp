@@ -82,6 +82,43 @@ TEST(CalibrateTargets, FindsTheCameraToo) {
   EXPECT_NEAR(c.cameras[0].k1, capture.camera.k1, 0.002);
 }
 
+TEST(CalibrateTargets, ALensThatHasMoreTermsIsGivenThem) {
+  SimulatedOptions o;
+  o.photos = 24;
+  o.targets = 120;
+  o.radius_m = 1.5;
+  o.noise_px = 0.01;
+  const Calibration plain = calibrate(simulate_capture(o), false);
+  EXPECT_EQ(plain.cameras[0].s, 1);  // nothing asks for it
+  EXPECT_EQ(plain.cameras[0].k3, 0);
+  o.s = 1.0004;
+  o.k3 = 0.01;
+  const SimulatedCapture capture = simulate_capture(o);
+  const Calibration c = calibrate(capture, false);
+  EXPECT_EQ(pose_errors(capture, c).photos, o.photos);
+  EXPECT_NEAR(c.cameras[0].s, o.s, 5 * std::sqrt(c.camera_covariances[0](1, 1)));
+  EXPECT_NEAR(c.cameras[0].k3, o.k3, 5 * std::sqrt(c.camera_covariances[0](7, 7)));
+  EXPECT_NEAR(c.sigma0, 1, 0.05);
+  EXPECT_GT(c.share, 0.995);
+}
+
+TEST(CalibrateTargets, AModelThatDoesNotFitPushesNoPhotographOut) {
+  SimulatedOptions o;
+  o.photos = 24;
+  o.targets = 120;
+  o.radius_m = 1.5;
+  o.noise_px = 0.005;  // what is left over is far more
+  o.s = 1.0008;
+  const SimulatedCapture capture = simulate_capture(o);
+  CalibrateOptions options;
+  options.more_if_needed = false;
+  const Calibration c = calibrate(capture, false, options);
+  EXPECT_EQ(pose_errors(capture, c).photos, o.photos);
+  EXPECT_GT(c.share, 0.9);
+  EXPECT_GT(c.sigma0, 1.3);
+  EXPECT_THAT(c.verdict, HasSubstr("Usable with care"));
+}
+
 TEST(CalibrateTargets, SmallTagsThatCanBeTiltedEitherWay) {
   SimulatedOptions o;
   o.family = "aruco:6x6_250:35mm";

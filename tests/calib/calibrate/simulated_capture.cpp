@@ -61,6 +61,7 @@ SimulatedCapture simulate_capture(const SimulatedOptions& o) {
   c.camera.width = 3000, c.camera.height = 2000;
   c.camera.f = 2400, c.camera.u0 = 1510, c.camera.v0 = 985;
   c.camera.k1 = 0.05, c.camera.k2 = -0.02, c.camera.p1 = 0.0005, c.camera.p2 = -0.0004;
+  c.camera.s = o.s, c.camera.k3 = o.k3;
   std::mt19937_64 random(o.seed);
   std::uniform_real_distribution<double> unit(0, 1);
   const auto facing = [&](const Vector3d& place, const Vector3d& normal) {

@@ -13,6 +13,7 @@ struct SimulatedOptions {
   int photos = 60, targets = 40;
   double radius_m = 2.7, room_m = 3;  ///< of the cameras' hemisphere, of the cylinder of walls
   double noise_px = 0.05;             ///< standard deviation of each coordinate, which the covariances say, too
+  double s = 1, k3 = 0;               ///< of the lens, beside its k1, k2, p1, p2
   const char* family = "matrix5x5:36mm";
   bool floor_only = false;  ///< all targets on the floor, as on a sheet
   std::uint64_t seed = 1;
