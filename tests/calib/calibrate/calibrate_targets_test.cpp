@@ -242,13 +242,13 @@ TEST(CalibrateTargets, PartsThatShareNothingAreBothKept) {
   for (const bool first : {true, false}) {
     const CalibratedBody* before = nullptr;
     for (const CalibratedBody& b : c.bodies) {
-      if ((b.id % 4 < 2) == first || !b.part_from_body) continue;
+      if ((b.id % 4 < 2) != first || !b.part_from_body) continue;
       EXPECT_EQ(b.part, first ? 0 : 1) << b.name;
       EXPECT_EQ(b.placed, first) << b.name;
       if (before) {
         const auto& truth = capture.world_from_target;
         EXPECT_NEAR((b.part_from_body->translation - before->part_from_body->translation).norm(),
-                    (truth[std::size_t(b.id)].translation - truth[std::size_t(before->id)].translation).norm(), 1e-3);
+                    (truth[std::size_t(b.id)].translation - truth[std::size_t(before->id)].translation).norm(), 1e-2);
       }
       before = &b;
     }
