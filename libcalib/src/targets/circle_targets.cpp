@@ -10,6 +10,7 @@
 #include <cmath>
 #include <optional>
 
+#include "ellipse_starts.h"
 #include "read_cells.h"
 
 namespace lumihull::calib {
@@ -102,13 +103,14 @@ Contours measure(const LightPlane& plane, std::span<const Ellipse> circles,
                  const CellReading& first, const CircleLook& look, const DetectOptions& options) {
   Contours contours;
   contours.fits.resize(circles.size());
+  const double blur = std::sqrt(std::max(0.0, first.blur_px * first.blur_px - 1.0 / 12));  // without the pixel's
   for (std::size_t i = 0; i < circles.size(); ++i) {
     if (states[i] != EllipseState::good) continue;
     const Ellipse& guess = circles[i];
     EllipseOptions fit_options = options.ellipse;
     fit_options.inner_ratio = first.cells[i] == Cell::light && !look.solid_light ? look.ring_ratio : 0;
     EllipseFit& fit = contours.fits[i];
-    fit = options.refine ? fit_ellipse(plane, guess, fit_options) : dual_conic_fit(plane, guess, fit_options);
+    fit = options.refine ? fit_ellipse(plane, guess, fit_options, blur) : dual_conic_fit(plane, guess, fit_options);
     if (fit.state != EllipseState::good) continue;
     const bool meant = can_be(fit, guess) || (predicted[i] && can_be(fit, *predicted[i]));
     if (!meant || fit.outside <= fit.inside) {

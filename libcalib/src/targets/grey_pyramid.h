@@ -14,11 +14,11 @@ namespace lumihull::calib {
 /// their order and rough differences matter here; contours are measured elsewhere, in linear light.
 struct GreyLevel {
   int width = 0, height = 0;
-  std::vector<std::uint8_t> pixels;        ///< empty where `borrowed` is set
+  Image pixels;                            ///< empty where `borrowed` is set
   const std::uint8_t* borrowed = nullptr;  ///< a grey photograph's own pixels
 
   const std::uint8_t* row(int y) const {
-    return (borrowed ? borrowed : pixels.data()) + std::size_t(y) * std::size_t(width);
+    return (borrowed ? borrowed : pixels.row<std::uint8_t>(0)) + std::size_t(y) * std::size_t(width);
   }
 };
 
