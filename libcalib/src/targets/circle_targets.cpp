@@ -11,7 +11,6 @@
 #include <optional>
 
 #include "ellipse_starts.h"
-#include "read_cells.h"
 
 namespace lumihull::calib {
 
@@ -26,8 +25,9 @@ using Eigen::Vector3d;
 /// what hides a part of one may make it look like the other.
 constexpr double kWorstUnchecked = 0.28;
 
-CircleLook look_of(const TargetDesign& design) {
-  return {design.ring_radius_m() / design.circle_radius_m(), design.solid_light};
+Eigen::Vector3f linear_color(const Rgb& c) {
+  return {linear_from_srgb(float(c[0]) / 255), linear_from_srgb(float(c[1]) / 255),
+          linear_from_srgb(float(c[2]) / 255)};
 }
 
 // A design's grid before its orientation is known: without the print's scale.
@@ -113,7 +113,8 @@ Contours measure(const LightPlane& plane, std::span<const Ellipse> circles,
     fit = options.refine ? fit_ellipse(plane, guess, fit_options, blur) : dual_conic_fit(plane, guess, fit_options);
     if (fit.state != EllipseState::good) continue;
     const bool meant = can_be(fit, guess) || (predicted[i] && can_be(fit, *predicted[i]));
-    if (!meant || fit.outside <= fit.inside) {
+    const bool lighter = look.solid_light && first.cells[i] == Cell::light;
+    if (!meant || (lighter ? fit.outside >= fit.inside : fit.outside <= fit.inside)) {
       fit.state = EllipseState::no_fit;
       continue;
     }
@@ -129,6 +130,20 @@ struct Try {
 };
 
 }  // namespace
+
+Eigen::Vector3f circle_weights(const TargetDesign& design) {
+  return contrast_weights(linear_color(design.ink),
+                          design.solid_light ? Eigen::Vector3f(1, 1, 1) : linear_color(design.paper));
+}
+
+CircleLook look_of(const TargetDesign& design) {
+  CircleLook look{design.ring_radius_m() / design.circle_radius_m(), design.solid_light};
+  if (!design.solid_light) return look;
+  const Eigen::Vector3f weights = circle_weights(design), paper = linear_color(design.paper);
+  look.light_contrast = double(weights.dot(Eigen::Vector3f(1, 1, 1) - paper)) /
+                        std::max(1e-6, double(weights.dot(paper - linear_color(design.ink))));
+  return look;
+}
 
 Ellipse ellipse_of(const Blob& blob) {
   Ellipse e;

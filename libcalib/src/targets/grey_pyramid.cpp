@@ -116,6 +116,23 @@ GreyPyramid grey_pyramid(const Image& photo, const std::array<float, 3>& weights
   });
 }
 
+GreyPyramid negative(const GreyPyramid& pyramid, Job& job) {
+  GreyPyramid negatives;
+  for (const GreyLevel& level : pyramid) {
+    GreyLevel& to = negatives.emplace_back();
+    to.width = level.width, to.height = level.height;
+    to.pixels = Image::uninitialized(to.width, to.height, 1);
+    parallel_chunks(job, std::size_t(to.height), kBand, [&](std::size_t first, std::size_t last) {
+      for (std::size_t y = first; y < last; ++y) {
+        const std::uint8_t* in = level.row(int(y));
+        std::uint8_t* out = to.pixels.row<std::uint8_t>(int(y));
+        for (int x = 0; x < to.width; ++x) out[x] = std::uint8_t(255 - in[x]);
+      }
+    });
+  }
+  return negatives;
+}
+
 GreyPyramid key_pyramid(const Image& photo, const ColorKey& ink, Job& job) {
   return build(base_level(photo, false), job, [&](int y, GreyLevel& level) {
     std::vector<std::uint64_t> bits((std::size_t(level.width) + 63) / 64);

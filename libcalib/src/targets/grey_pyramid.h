@@ -34,6 +34,9 @@ const Image& eight_bit(const Image& photo, Image& storage);
 /// photographs (1 channel) as they are. photo: 8 bits, outlives the pyramid.
 GreyPyramid grey_pyramid(const Image& photo, const std::array<float, 3>& weights, Job& job);
 
+/// 255 less each value.
+GreyPyramid negative(const GreyPyramid& pyramid, Job& job);
+
 /// 0 where the key says object (ink), 255 elsewhere. photo: 8 bits, 3 channels.
 GreyPyramid key_pyramid(const Image& photo, const ColorKey& ink, Job& job);
 
