@@ -74,7 +74,7 @@ void cover_a_circle(const calib::TargetDesign& design, TargetShot& shot, Dice& d
 }
 
 // paper4x4 has no check bits: what hides a part of a circle may make another word of it. Whole targets are all read;
-// wrong ids are at most 2 % of those that a bar crosses, and at most 5 % of those on which a spot of the paper's or the
+// wrong ids are at most 2 % of those that a bar crosses, and at most 3 % of those on which a spot of the paper's or the
 // ink's own colour lies over a part of one circle. With check bits none is wrong.
 TEST(ManyTargets, WithoutCheckBitsHiddenOnesAreSeldomMisread) {
   Job job({}, 1);
@@ -102,9 +102,9 @@ TEST(ManyTargets, WithoutCheckBitsHiddenOnesAreSeldomMisread) {
       EXPECT_TRUE(verdict.found);
       EXPECT_EQ(verdict.wrong, 0);
     }
-    std::printf("%s: %d wrong of %d crossed, %d wrong and %d found of %d spotted\n", family.c_str(), crossed, int(kBars), spotted, spotted_found, int(kSpots));
     EXPECT_LE(crossed, checked ? 0 : int(kBars) / 50);
-    EXPECT_LE(spotted, checked ? 0 : int(kSpots) / 20);
+    EXPECT_LE(spotted, checked ? 0 : int(kSpots) * 3 / 100);  // 3 when this was written
+    EXPECT_GE(spotted_found, checked ? int(kSpots) : int(kSpots) / 4);  // what does no harm is no reason to refuse
   }
 }
 
