@@ -196,8 +196,8 @@ void ContourFit::weigh(Block& block) {
   // By the model, not only by the value: to leave out those that noise has lifted would pull the level down. What
   // is far below the limit is not clipped, whatever the model says: else it could explain all by light beyond it.
   const float near_limit = limit - 5 * std::sqrt(float(noise.variance(double(limit))));
-  const IntLanes clipped = (block.value >= all(limit)) |
-                           ((v > all(limit) - all(2) * variance * inverse) & (block.value > all(near_limit)));
+  const IntLanes clipped =
+      (block.value >= all(limit)) | ((v > all(limit) - all(2) * variance * inverse) & (block.value > all(near_limit)));
   block.variance = variance;
   block.weight = inverse * inverse;
   bool all_count = block.count == kLanes && all_used_;
@@ -375,7 +375,8 @@ bool ContourFit::iterate(ContourModel& model, int max_iterations, double converg
     if (lambda > 1e6) break;
   }
   if (!current)
-    for_each_residual(model, [](const Block&, const BlurredEllipse::Share&, const Lanes&, const Lanes&, const Lanes&) {});
+    for_each_residual(model,
+                      [](const Block&, const BlurredEllipse::Share&, const Lanes&, const Lanes&, const Lanes&) {});
   squares_ = squares;
   information_ = h;
   return std::isfinite(squares);

@@ -43,9 +43,8 @@ std::vector<Search> searches_of(const TargetSet& set) {
       if (pitch > 1.1 * s.pitch_in_radii || s.pitch_in_radii > 1.1 * pitch) continue;
       if (s.solid_light != d.solid_light) continue;
       // Equal targets of several sizes look the same: the board tells them apart.
-      const bool known = std::any_of(s.designs.begin(), s.designs.end(), [&](int other) {
-        return set.designs[std::size_t(other)].family == d.family;
-      });
+      const bool known = std::any_of(s.designs.begin(), s.designs.end(),
+                                     [&](int other) { return set.designs[std::size_t(other)].family == d.family; });
       if (!known) s.designs.push_back(design);
       return;
     }
@@ -146,9 +145,10 @@ TargetDetector::TargetDetector(TargetSet set, DetectOptions options) {
   options.validate();
   for (const TargetDesign& d : set.designs)
     if (d.solid_light && look_of(d).light_contrast < kLeastLightContrast)
-      throw Error(ErrorCode::unsupported,
-                  "light circles without rings are hardly lighter than their paper: print rings, or a darker paper colour",
-                  d.family.name());
+      throw Error(
+          ErrorCode::unsupported,
+          "light circles without rings are hardly lighter than their paper: print rings, or a darker paper colour",
+          d.family.name());
   impl_ = std::make_unique<const Impl>(std::move(set), std::move(options));
 }
 TargetDetector::TargetDetector(TargetDetector&&) noexcept = default;

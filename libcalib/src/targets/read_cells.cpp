@@ -168,7 +168,8 @@ CellReading read_cells(const LightPlane& plane, std::span<const Ellipse> circles
     if (apart < 6 * noise || apart < 0.08) continue;
     reading.separation = std::max(reading.separation, apart * reference);
     const double zone = 0.15 * apart;
-    const double dark_from = look.solid_light ? 0.5 : middle + zone, light_to = look.solid_light ? 0.5 * light : middle - zone;
+    const double dark_from = look.solid_light ? 0.5 : middle + zone,
+                 light_to = look.solid_light ? 0.5 * light : middle - zone;
     if (x > dark_from && x < 1 + 0.5 * apart + 4 * noise) reading.cells[i] = Cell::dark;
     if (x < light_to && x > light - 0.6 * apart - 4 * noise) reading.cells[i] = Cell::light;
     if (reading.cells[i] != Cell::unknown)

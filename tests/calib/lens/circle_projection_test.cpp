@@ -221,7 +221,8 @@ TEST(CircleProjection, IsSmoothUpToTheEdgeAndBeyond) {
             }
             at[s] = *projected_circle_center(camera, k);
           }
-          ASSERT_LT(((at[1] - at[0]) / (2 * h) - by_motion.col(m)).norm(), 2e-3 * by_motion.norm()) << tilt << ", " << m;
+          ASSERT_LT(((at[1] - at[0]) / (2 * h) - by_motion.col(m)).norm(), 2e-3 * by_motion.norm())
+              << tilt << ", " << m;
         }
       }
     }

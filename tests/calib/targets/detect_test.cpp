@@ -2,7 +2,6 @@
 #include <support.h>
 
 #include <Eigen/LU>
-
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -335,8 +334,8 @@ TEST(Detect, SolidLightCircles) {
       const TargetSet set = set_of({design});
       for (const double size : {6.0, 10.0, 30.0})
         for (const double tilt : {0.0, 45.0}) {
-          SCOPED_TRACE(testing::Message() << family << ", paper " << int(colors[1][0]) << ", " << size << " px, tilt "
-                                          << tilt);
+          SCOPED_TRACE(testing::Message()
+                       << family << ", paper " << int(colors[1][0]) << ", " << size << " px, tilt " << tilt);
           const auto one =
               test::one_target(design, size, tilt * kDegree, usual(), std::uint64_t(size * 100 + tilt), kDark);
           const Detections found = detect(one.photo, set);

@@ -61,15 +61,18 @@ void cover_a_circle(const calib::TargetDesign& design, TargetShot& shot, Dice& d
   const bool light = dice.chance(.7);
   const Eigen::Vector2d place = design.feature(circle), beside(.5 * design.size_m, .5 * design.size_m);
   const double reach = .6 * minor_px;
-  const Eigen::Vector2d middle = pixel_of(place) + Eigen::Vector2d(dice.between(-reach, reach), dice.between(-reach, reach));
+  const Eigen::Vector2d middle =
+      pixel_of(place) + Eigen::Vector2d(dice.between(-reach, reach), dice.between(-reach, reach));
   const Eigen::Vector2d from = pixel_of(light ? place - beside : design.feature(0));  // feature 0 is of the L: dark
   const double half = dice.between(.2, .6) * minor_px;
   const auto clamped = [&](double v, int size) { return std::clamp(int(v), 0, size - 1); };
   const int fx = clamped(from.x(), shot.photo.width()), fy = clamped(from.y(), shot.photo.height());
   std::uint8_t color[3];
   for (int c = 0; c < 3; ++c) color[c] = shot.photo.row<std::uint8_t>(fy)[3 * fx + c];
-  for (int y = clamped(middle.y() - half, shot.photo.height()); y <= clamped(middle.y() + half, shot.photo.height()); ++y)
-    for (int x = clamped(middle.x() - half, shot.photo.width()); x <= clamped(middle.x() + half, shot.photo.width()); ++x)
+  for (int y = clamped(middle.y() - half, shot.photo.height()); y <= clamped(middle.y() + half, shot.photo.height());
+       ++y)
+    for (int x = clamped(middle.x() - half, shot.photo.width()); x <= clamped(middle.x() + half, shot.photo.width());
+         ++x)
       for (int c = 0; c < 3; ++c) shot.photo.row<std::uint8_t>(y)[3 * x + c] = color[c];
 }
 
@@ -91,7 +94,8 @@ TEST(ManyTargets, WithoutCheckBitsHiddenOnesAreSeldomMisread) {
       const bool bar = seed < kBars, spot = !bar && seed < kBars + kSpots;
       Dice dice(1000 + seed);
       Seen seen;
-      seen.minor_px = dice.between(7, 14), seen.tilt_rad = dice.between(0, M_PI / 4), seen.blur_px = dice.between(.3, .8);
+      seen.minor_px = dice.between(7, 14), seen.tilt_rad = dice.between(0, M_PI / 4),
+      seen.blur_px = dice.between(.3, .8);
       seen.noise = .005, seen.occluded = bar;
       TargetShot shot = photograph_target(design, ids[std::size_t(seed * 37) % ids.size()], seen, 1000 + seed);
       if (spot) cover_a_circle(design, shot, dice, seen.minor_px);
@@ -103,7 +107,7 @@ TEST(ManyTargets, WithoutCheckBitsHiddenOnesAreSeldomMisread) {
       EXPECT_EQ(verdict.wrong, 0);
     }
     EXPECT_LE(crossed, checked ? 0 : int(kBars) / 50);
-    EXPECT_LE(spotted, checked ? 0 : int(kSpots) * 3 / 100);  // 3 when this was written
+    EXPECT_LE(spotted, checked ? 0 : int(kSpots) * 3 / 100);            // 3 when this was written
     EXPECT_GE(spotted_found, checked ? int(kSpots) : int(kSpots) / 4);  // what does no harm is no reason to refuse
   }
 }
