@@ -1,10 +1,11 @@
 // The centre of the ellipse that a circle is seen as. Without distortion a closed form; through a lens the
-// least-squares ellipse of contour points, and its derivatives.
+// least-squares ellipse of contour points, and its derivatives; near the circle's edge the closed form again.
 #include <lumihull/calib/circle_projection.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -25,6 +26,11 @@ using Matrix2x10 = Eigen::Matrix<double, 2, 10>;
 /// order and above; what the distortion adds to an ellipse has low ones (3rd order in the radius: 4).
 constexpr int kPlaces = 16;
 using Places = Eigen::Array<double, kPlaces, 1>;
+
+/// Cosine of the angle between line of sight and normal (about the ratio of the ellipse's axes) below which a distorted
+/// contour is too thin for an ellipse of its own: it is bent by as much as it is wide, and the closest ellipse jumps.
+/// No detector measures these; what is predicted goes over from one kind to the other in between.
+constexpr double kThin = 0.12, kWide = 0.2;
 
 struct UnitCircle {
   Places cosine, sine;
@@ -208,7 +214,7 @@ std::optional<Vector2d> through_lens(const Camera& camera, const Circle3& circle
   axes << share * (px * unit.cosine).sum(), share * (px * unit.sine).sum(),  //
       share * (py * unit.cosine).sum(), share * (py * unit.sine).sum();
   EllipseOfContour e;
-  if (!(std::abs(axes.determinant()) > 0)) return std::nullopt;  // seen edge-on
+  if (!(std::abs(axes.determinant()) > 0)) return std::nullopt;
   if (!fit(px, py, weight, camera.pixel_from_distorted(*distorted), axes, jacobian || by_parameters, e))
     return std::nullopt;
 
@@ -253,8 +259,11 @@ std::optional<Vector2d> projected_circle_center(const Camera& camera, const Circ
   const double depth = std::sqrt(std::max(0.0, 1 - normal.z() * normal.z()));  // of the circle, per radius
   if (!(circle.center.z() - circle.radius * depth > 0)) return std::nullopt;
   const Vector3d point = center_point(circle, normal);
-  if (circle.radius > 0 && (by_parameters || camera.has_distortion()))
-    return through_lens(camera, circle, point, jacobian, by_parameters);
+  // Share of the least-squares ellipse: 3t² - 2t³, so that derivatives have no step either.
+  const double distance = circle.center.norm(), facing = normal.dot(circle.center) / distance;
+  const bool by_contour = circle.radius > 0 && (by_parameters || camera.has_distortion());
+  const double t = by_contour ? std::clamp((std::abs(facing) - kThin) / (kWide - kThin), 0.0, 1.0) : 0;
+  if (t >= 1) return through_lens(camera, circle, point, jacobian, by_parameters);
 
   Matrix23d by_point;
   Vector2d pixel;
@@ -266,7 +275,24 @@ std::optional<Vector2d> projected_circle_center(const Camera& camera, const Circ
     pixel = *p;
   }
   if (jacobian) *jacobian = by_point * center_point_motion(circle, normal);
-  return pixel;
+  if (t <= 0) return pixel;
+
+  Matrix26 fit_jacobian;
+  Matrix2x10 fit_by_parameters;
+  const auto fitted = through_lens(camera, circle, point, jacobian ? &fit_jacobian : nullptr,
+                                   by_parameters ? &fit_by_parameters : nullptr);
+  if (!fitted) return std::nullopt;
+  const double share = t * t * (3 - 2 * t);
+  const Vector2d apart = *fitted - pixel;
+  if (jacobian) {
+    *jacobian += share * (fit_jacobian - *jacobian);
+    // A rotation about the camera turns normal and line of sight alike; a movement changes the latter.
+    const Vector3d by_place = (normal - facing / distance * circle.center) / distance;
+    const double by_facing = 6 * t * (1 - t) / (kWide - kThin) * (facing < 0 ? -1 : 1);
+    jacobian->rightCols<3>() += by_facing * apart * by_place.transpose();
+  }
+  if (by_parameters) *by_parameters += share * (fit_by_parameters - *by_parameters);
+  return pixel + share * apart;
 }
 
 Vector2d homography_circle_center(const Matrix3d& pixel_from_plane, const Vector2d& center, double radius) {

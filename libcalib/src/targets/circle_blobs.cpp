@@ -24,11 +24,11 @@ struct Tiles {
   int columns = 0, rows = 0;
   std::vector<std::uint8_t> low, high;            // of the tile itself
   std::vector<std::uint8_t> near_low, near_high;  // of 3 x 3 tiles
-  std::vector<std::uint8_t> threshold, halfway;
+  std::vector<std::uint8_t> threshold, halfway, quarter;
 
   explicit Tiles(const GreyLevel& level)
       : columns((level.width + kTile - 1) / kTile), rows((level.height + kTile - 1) / kTile) {
-    for (auto* v : {&low, &high, &near_low, &near_high, &threshold, &halfway})
+    for (auto* v : {&low, &high, &near_low, &near_high, &threshold, &halfway, &quarter})
       v->resize(std::size_t(columns) * std::size_t(rows));
   }
   std::size_t at(int column, int row) const { return std::size_t(row) * std::size_t(columns) + std::size_t(column); }
@@ -81,7 +81,7 @@ void choose_thresholds(Tiles& tiles, int row, const std::array<float, 8>& noise,
     const std::size_t i = tiles.at(c, row);
     tiles.near_low[i] = lo;
     tiles.near_high[i] = hi;
-    tiles.threshold[i] = tiles.halfway[i] = 0;
+    tiles.threshold[i] = tiles.halfway[i] = tiles.quarter[i] = 0;
     if (ink && !ink_near(*ink, c, row)) continue;
     // Extremes of 576 values of noise lie about 6.2 standard deviations apart.
     const float sigma = noise[std::size_t((lo + hi) / 2 >> 5)], contrast = float(hi - lo);
@@ -90,6 +90,7 @@ void choose_thresholds(Tiles& tiles, int row, const std::array<float, 8>& noise,
         std::max(0.5f * contrast, std::min(0.75f * contrast, contrast - 6.5f * noise[std::size_t(hi >> 5)]));
     tiles.threshold[i] = std::uint8_t(float(lo) + at + 0.5f);
     tiles.halfway[i] = std::uint8_t((lo + hi + 1) / 2);
+    tiles.quarter[i] = std::uint8_t((3 * lo + hi + 2) / 4);
   }
 }
 
@@ -385,7 +386,8 @@ std::vector<Blob> find_blobs(const GreyPyramid& grey, const GreyPyramid* ink, co
   for (int l = 0; l < int(grey.size()); ++l)
     for (int y = 0; y < grey[std::size_t(l)].height; y += kStrip)
       strips.push_back({l, y, std::min(y + kStrip, grey[std::size_t(l)].height)});
-  const std::size_t kinds = ink ? 3 : 2;
+  // Two thresholds on grey, one on ink; and the third one on grey.
+  const std::size_t ink_kind = 2, quarter_kind = ink ? 3 : 2, kinds = quarter_kind + (options.both_kinds ? 1 : 0);
   std::vector<std::vector<Blob>> found(kinds * strips.size());
   parallel_for(job, found.size(), [&](std::size_t i) {
     const Part& p = strips[i % strips.size()];
@@ -393,10 +395,10 @@ std::vector<Blob> find_blobs(const GreyPyramid& grey, const GreyPyramid* ink, co
     const double least = p.level == 0 ? 0.75 * options.min_circle_px
                                       : std::max(kSmallestMinor, 0.75 * std::ldexp(options.min_circle_px, -p.level));
     const std::size_t kind = i / strips.size();
-    const GreyLevel& level = kind < 2 ? grey[l] : (*ink)[l];
-    const Tiles& tiles = kind < 2 ? grey_tiles[l] : ink_tiles[l];
-    found[i] =
-        blobs_of_strip(level, tiles, kind == 1 ? tiles.halfway : tiles.threshold, p.level, p.first, p.last, least);
+    const bool on_ink = ink && kind == ink_kind;
+    const Tiles& tiles = on_ink ? ink_tiles[l] : grey_tiles[l];
+    const auto& thresholds = kind == 1 ? tiles.halfway : kind == quarter_kind ? tiles.quarter : tiles.threshold;
+    found[i] = blobs_of_strip(on_ink ? (*ink)[l] : grey[l], tiles, thresholds, p.level, p.first, p.last, least);
   });
   std::vector<Blob> all;
   for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());

@@ -23,6 +23,8 @@ struct Blob {
 struct BlobOptions {
   double min_circle_px = 4.5;  ///< smallest minor axis (full), px of the photograph
   int min_contrast = 12;       ///< grey values
+  /// Spots darker and lighter than their paper stand side by side: a third threshold, a quarter of the way up.
+  bool both_kinds = false;
 };
 
 /// Dark ellipses of all sizes. Each level is thresholded between the smallest and the largest value of 3 x 3 tiles of 8
@@ -32,6 +34,7 @@ struct BlobOptions {
 ///
 /// ink: of the same size, 0 = ink by its key, or null. Where it is given, spots are looked for in it and in `grey`
 /// close to ink: the key tells where, but a small ring's wall is a mixture of colours, and not ink to it.
+/// Light spots are the dark ones of the negative (grey_pyramid.h).
 std::vector<Blob> find_blobs(const GreyPyramid& grey, const GreyPyramid* ink, const BlobOptions& options, Job& job);
 
 }  // namespace lumihull::calib

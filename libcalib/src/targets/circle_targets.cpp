@@ -10,7 +10,7 @@
 #include <cmath>
 #include <optional>
 
-#include "read_cells.h"
+#include "ellipse_starts.h"
 
 namespace lumihull::calib {
 
@@ -25,8 +25,9 @@ using Eigen::Vector3d;
 /// what hides a part of one may make it look like the other.
 constexpr double kWorstUnchecked = 0.28;
 
-CircleLook look_of(const TargetDesign& design) {
-  return {design.ring_radius_m() / design.circle_radius_m(), design.solid_light};
+Eigen::Vector3f linear_color(const Rgb& c) {
+  return {linear_from_srgb(float(c[0]) / 255), linear_from_srgb(float(c[1]) / 255),
+          linear_from_srgb(float(c[2]) / 255)};
 }
 
 // A design's grid before its orientation is known: without the print's scale.
@@ -102,16 +103,18 @@ Contours measure(const LightPlane& plane, std::span<const Ellipse> circles,
                  const CellReading& first, const CircleLook& look, const DetectOptions& options) {
   Contours contours;
   contours.fits.resize(circles.size());
+  const double blur = std::sqrt(std::max(0.0, first.blur_px * first.blur_px - 1.0 / 12));  // without the pixel's
   for (std::size_t i = 0; i < circles.size(); ++i) {
     if (states[i] != EllipseState::good) continue;
     const Ellipse& guess = circles[i];
     EllipseOptions fit_options = options.ellipse;
     fit_options.inner_ratio = first.cells[i] == Cell::light && !look.solid_light ? look.ring_ratio : 0;
     EllipseFit& fit = contours.fits[i];
-    fit = options.refine ? fit_ellipse(plane, guess, fit_options) : dual_conic_fit(plane, guess, fit_options);
+    fit = options.refine ? fit_ellipse(plane, guess, fit_options, blur) : dual_conic_fit(plane, guess, fit_options);
     if (fit.state != EllipseState::good) continue;
     const bool meant = can_be(fit, guess) || (predicted[i] && can_be(fit, *predicted[i]));
-    if (!meant || fit.outside <= fit.inside) {
+    const bool lighter = look.solid_light && first.cells[i] == Cell::light;
+    if (!meant || (lighter ? fit.outside >= fit.inside : fit.outside <= fit.inside)) {
       fit.state = EllipseState::no_fit;
       continue;
     }
@@ -127,6 +130,20 @@ struct Try {
 };
 
 }  // namespace
+
+Eigen::Vector3f circle_weights(const TargetDesign& design) {
+  return contrast_weights(linear_color(design.ink),
+                          design.solid_light ? Eigen::Vector3f(1, 1, 1) : linear_color(design.paper));
+}
+
+CircleLook look_of(const TargetDesign& design) {
+  CircleLook look{design.ring_radius_m() / design.circle_radius_m(), design.solid_light};
+  if (!design.solid_light) return look;
+  const Eigen::Vector3f weights = circle_weights(design), paper = linear_color(design.paper);
+  look.light_contrast = double(weights.dot(Eigen::Vector3f(1, 1, 1) - paper)) /
+                        std::max(1e-6, double(weights.dot(paper - linear_color(design.ink))));
+  return look;
+}
 
 Ellipse ellipse_of(const Blob& blob) {
   Ellipse e;

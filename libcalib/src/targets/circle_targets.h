@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "circle_lattice.h"
+#include "read_cells.h"
 
 namespace lumihull::calib {
 
@@ -31,6 +32,13 @@ std::vector<Window> find_windows(const LightPlane& plane, std::span<const Blob> 
 /// Measures a window's circles, reads them, and accepts it or not.
 WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, const Window& window,
                          const TargetSet& set, const DetectOptions& options);
+
+/// Weights of the plane that a design of circles is looked for on: what tells ink from paper; with solid light circles,
+/// ink from bare white paper, between which the printed paper's colour lies.
+Eigen::Vector3f circle_weights(const TargetDesign& design);
+
+/// How a design's circles look on that plane.
+CircleLook look_of(const TargetDesign& design);
 
 /// Ellipse of a blob.
 Ellipse ellipse_of(const Blob& blob);

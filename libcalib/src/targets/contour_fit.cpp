@@ -28,12 +28,17 @@ constexpr double kFlat = 4.5;            // s from the contour: no edge is seen,
 // What a corrected share may be off by, in px of the contour: the correction changes by about κ³ s³ of the model's
 // movement.
 constexpr double kCorrected = 5e-5;
+constexpr double kFeetMoved = 0.01;  // px that a contour moves before its nearest points are looked for again
 
 }  // namespace
 
 void ContourFit::gather(const Ellipse& ellipse, const ContourModel& model, const BandWidth& band, int sectors,
-                        double inner_ratio) {
+                        double inner_ratio, bool rough) {
   blocks_.clear();
+  // As many as there will be, nearly: they are large.
+  const double wide = band.inward + band.outward, about = 2 * std::numbers::pi * ellipse.a * wide;
+  blocks_.reserve(std::size_t(std::min(1e5, about / kLanes)) + 8);
+  rough_ = rough, correct_next_ = weigh_next_ = false;
   sectors_.assign(std::size_t(sectors), {});
   longest_ = ellipse.a;
   gathered_ = 0;
@@ -46,18 +51,17 @@ void ContourFit::gather(const Ellipse& ellipse, const ContourModel& model, const
   const float flat = quick_ ? float(kFlat * s) : 1e9f, flat_outside = flat, flat_inside = inner_ratio > 0 ? 1e9f : flat;
 
   constexpr std::size_t outside_flat = BlurredEllipse::kSides, inside_flat = outside_flat + 1;
-  std::array<Block, inside_flat + 1> open{};  // edges by side, then levels
-  for (std::size_t i = 0; i < open.size(); ++i) {
-    open[i].part = i < outside_flat ? Part::edge : i == outside_flat ? Part::outside : Part::inside;
-    open[i].pixels.side = i < outside_flat ? BlurredEllipse::Side(i) : BlurredEllipse::right;
-  }
+  std::array<std::size_t, inside_flat + 1> open;  // edges by side, then levels: the block that is being filled
+  constexpr std::size_t none = ~std::size_t(0);
+  open.fill(none);
   const UnitFrame frame(ellipse);
   const Lanes per_radian = all(float(sectors / (2 * std::numbers::pi)));
   const auto lanes_of = [](double v) { return all(float(v)); };
   const Lanes v11 = lanes_of(frame.inverse(0, 0)), v12 = lanes_of(frame.inverse(0, 1)),
               v22 = lanes_of(frame.inverse(1, 1)), middle_x = lanes_of(ellipse.center.x() - origin_.x()),
               middle_y = lanes_of(ellipse.center.y() - origin_.y());
-  const auto close = [&](Block& block) {
+  const auto close = [&](std::size_t index) {
+    Block& block = blocks_[index];
     BlurredEllipse::Pixels& p = block.pixels;
     const Lanes x = p.x - middle_x, y = p.y - middle_y;
     const Lanes turn = (angle_of(v12 * x + v22 * y, v11 * x + v12 * y) + all(float(std::numbers::pi))) * per_radian;
@@ -70,8 +74,6 @@ void ContourFit::gather(const Ellipse& ellipse, const ContourModel& model, const
       p.low_x = std::min(p.low_x, p.x[i]), p.high_x = std::max(p.high_x, p.x[i]);
       p.low_y = std::min(p.low_y, p.y[i]), p.high_y = std::max(p.high_y, p.y[i]);
     }
-    blocks_.push_back(block);
-    block.count = 0;
   };
   const PixelBox box{0, 0, plane_.values.width(), plane_.values.height()};
   for_each_in_band(ellipse, frame, band, box, [&](const BandPixels& p) {
@@ -83,19 +85,28 @@ void ContourFit::gather(const Ellipse& ellipse, const ContourModel& model, const
       if (distance >= -flat_inside && distance <= flat_outside)
         kind = std::abs(gx) >= std::abs(gy) ? (gx > 0 ? BlurredEllipse::right : BlurredEllipse::left)
                                             : (gy > 0 ? BlurredEllipse::bottom : BlurredEllipse::top);
-      Block& block = open[kind];
+      if (open[kind] == none) {
+        open[kind] = blocks_.size();
+        Block& fresh = blocks_.emplace_back();
+        fresh.part = kind < outside_flat ? Part::edge : kind == outside_flat ? Part::outside : Part::inside;
+        fresh.pixels.side = kind < outside_flat ? BlurredEllipse::Side(kind) : BlurredEllipse::right;
+      }
+      Block& block = blocks_[open[kind]];
       const int lane = block.count++;
       block.pixels.x[lane] = float(p.x + i + 0.5 - origin_.x());
       block.pixels.y[lane] = float(p.y + 0.5 - origin_.y());
       block.value[lane] = values[i];
       ++gathered_;
-      if (block.count == kLanes) close(block);
+      if (block.count < kLanes) continue;
+      close(open[kind]);
+      open[kind] = none;
     }
   });
-  for (Block& block : open)
-    if (block.count > 0) close(block);
+  for (const std::size_t index : open)
+    if (index != none) close(index);
   if (!quick_) return;
   set(model);
+  feet_at_ = model;
   for (Block& block : blocks_) {
     block.correction = all(0);
     if (block.part != Part::edge) continue;
@@ -114,34 +125,24 @@ void ContourFit::set(const ContourModel& model) {
   if (inner_ratio_ > 0) inner_.set(model.center(), model.root(), s, ratio, true);
 }
 
-void ContourFit::look(Block& block, BlurredEllipse::Share& share) const {
-  share = BlurredEllipse::Share{};
-  outer_.add(block.pixels, block.foot, share);
-  if (inner_ratio_ > 0) inner_.add(block.pixels, block.inner_foot, share);
-}
-
 bool ContourFit::corrected(const ContourModel& model) const {
   const double moved = (model.p - corrected_at_.p).head<ContourModel::blur + 1>().norm();
-  if (!near_ && curvature_ < kMildCurvature) return true;
+  if (rough_ && curvature_ < kMildCurvature) return true;
   return !quick_ || moved * curvature_ * curvature_ * curvature_ < kCorrected;
-}
-
-void ContourFit::correct(const ContourModel& model) {
-  set(model);
-  exact_.set(model.center(), model.root(), model.p[ContourModel::blur],
-             inner_ratio_ > 0 ? model.p[ContourModel::ratio] : 0);
-  BlurredEllipse::Share share;
-  for (Block& block : blocks_) {
-    if (block.part != Part::edge) continue;
-    look(block, share);
-    block.correction = exact_.covered(block.pixels) - share.w;
-  }
-  corrected_at_ = model;
 }
 
 template <class Body>
 void ContourFit::for_each_residual(const ContourModel& model, Body&& body) {
   set(model);
+  const bool correcting = quick_ && correct_next_;
+  correct_next_ = false;
+  if (correcting) {
+    exact_.set(model.center(), model.root(), model.p[ContourModel::blur],
+               inner_ratio_ > 0 ? model.p[ContourModel::ratio] : 0);
+    corrected_at_ = model;
+  }
+  const bool follow = quick_ && (model.p - feet_at_.p).head<ContourModel::root22 + 1>().norm() > kFeetMoved;
+  if (follow) feet_at_ = model;
   BlurredEllipse::Share share;
   const Lanes gx = all(float(model.p[ContourModel::light_x] / unit_)),
               gy = all(float(model.p[ContourModel::light_y] / unit_));
@@ -160,7 +161,14 @@ void ContourFit::for_each_residual(const ContourModel& model, Body&& body) {
       continue;
     }
     if (quick_) {
-      look(block, share);
+      share = BlurredEllipse::Share{};
+      if (follow) outer_.follow(block.pixels, block.foot);
+      outer_.add(block.pixels, block.foot, share);
+      if (inner_ratio_ > 0) {
+        if (follow) inner_.follow(block.pixels, block.inner_foot);
+        inner_.add(block.pixels, block.inner_foot, share);
+      }
+      if (correcting) block.correction = exact_.covered(block.pixels) - share.w;
       share.w += block.correction;
     } else {
       exact_.evaluate(block.pixels, share);
@@ -173,34 +181,51 @@ void ContourFit::for_each_residual(const ContourModel& model, Body&& body) {
   }
 }
 
-void ContourFit::expect(const ContourModel& model, bool near) {
-  near_ = near;
-  if (near && !corrected(model)) correct(model);
+void ContourFit::expect(const ContourModel& model) {
+  correct_next_ = !rough_ && !corrected(model);
   for_each_residual(model, [](const Block&, const BlurredEllipse::Share&, const Lanes&, const Lanes&, const Lanes&) {});
 }
 
-void ContourFit::weigh() {
-  pixels_ = clipped_ = 0;
-  const double scale = noise_scale_ * noise_scale_, limit = double(plane_.saturation),
-               limit_noise = std::sqrt(plane_.noise.variance(limit));
-  for (Block& block : blocks_)
-    for (int i = 0; i < kLanes; ++i) {
-      const double v = double(block.expected[i]), jitter = jitter_px_ * double(block.slope[i]);
-      const double variance = std::max(1e-14, scale * plane_.noise.variance(v)) + jitter * jitter;
-      // By the model, not only by the value: to leave out those that noise has lifted would pull the level down. What
-      // is far below the limit is not clipped, whatever the model says: else it could explain all by light beyond it.
-      const bool clipped = block.value[i] >= plane_.saturation ||
-                           (v > limit - 2 * std::sqrt(variance) && double(block.value[i]) > limit - 5 * limit_noise);
-      const bool counts = i < block.count && !clipped && sectors_[block.sector[std::size_t(i)]].used;
-      block.variance[i] = float(variance);
-      block.weight[i] = counts ? float(1 / variance) : 0.0f;
-      pixels_ += counts;
-      clipped_ += i < block.count && clipped;
-    }
+void ContourFit::weigh(Block& block) {
+  const PlaneNoise& noise = plane_.noise;
+  const float scale = float(noise_scale_ * noise_scale_), limit = plane_.saturation;
+  const Lanes v = block.expected, jitter = all(float(jitter_px_)) * block.slope;
+  const Lanes plain = all(scale) * (all(float(noise.read)) + all(float(noise.gain)) * chosen(v > all(0), v, all(0)));
+  const Lanes variance = chosen(plain > all(1e-14f), plain, all(1e-14f)) + jitter * jitter;
+  const Lanes inverse = inverse_root(variance);
+  // By the model, not only by the value: to leave out those that noise has lifted would pull the level down. What
+  // is far below the limit is not clipped, whatever the model says: else it could explain all by light beyond it.
+  const float near_limit = limit - 5 * std::sqrt(float(noise.variance(double(limit))));
+  const IntLanes clipped =
+      (block.value >= all(limit)) | ((v > all(limit) - all(2) * variance * inverse) & (block.value > all(near_limit)));
+  block.variance = variance;
+  block.weight = inverse * inverse;
+  bool all_count = block.count == kLanes && all_used_;
+  for (int i = 0; i < kLanes; ++i) all_count &= clipped[i] == 0;
+  if (all_count) {
+    pixels_ += kLanes;
+    return;
+  }
+  for (int i = 0; i < kLanes; ++i) {
+    const bool there = i < block.count, counts = there && !clipped[i] && sectors_[block.sector[std::size_t(i)]].used;
+    if (!counts) block.weight[i] = 0;
+    pixels_ += counts;
+    clipped_ += there && clipped[i];
+  }
 }
 
-double ContourFit::evaluate(const ContourModel& model, double robust, ContourModel::Matrix* normal,
-                            ContourModel::Vector* right) {
+void ContourFit::start_weighing() {
+  pixels_ = clipped_ = 0;
+  all_used_ = std::all_of(sectors_.begin(), sectors_.end(), [](const Sector& s) { return s.used; });
+}
+
+void ContourFit::weigh() {
+  start_weighing();
+  for (Block& block : blocks_) weigh(block);
+}
+
+double ContourFit::evaluate(const ContourModel& model, double robust, ContourModel::Matrix& normal,
+                            ContourModel::Vector& right) {
   constexpr int kPairs = kSize * (kSize + 1) / 2;
   std::array<Lanes, kPairs + kSize + 1> sums{};
   ContourModel::Matrix h = ContourModel::Matrix::Zero();
@@ -224,8 +249,12 @@ double ContourFit::evaluate(const ContourModel& model, double robust, ContourMod
   const Lanes spread = step * all(float(model.p[ContourModel::blur] * model.p[ContourModel::blur]));
   const Lanes limit = all(robust > 0 ? float(1 / (robust * robust)) : 0.0f);
   int since = 0;
+  const bool weighing = weigh_next_;
+  weigh_next_ = false;
+  if (weighing) start_weighing();
   for_each_residual(model, [&](Block& block, const BlurredEllipse::Share& share, const Lanes& light, const Lanes& plain,
                                const Lanes& residual) {
+    if (weighing) weigh(block);
     const Lanes scaled = residual * residual * block.weight, damping = all(1) / (all(1) + limit * scaled);
     sums[kPairs + kSize] += scaled * damping;
     const Lanes weight = block.weight * damping * damping, by_share = step * light;
@@ -262,17 +291,19 @@ double ContourFit::evaluate(const ContourModel& model, double robust, ContourMod
     if (++since == kFlush) flush(), since = 0;
   });
   flush();
-  if (normal) *normal = h.selfadjointView<Eigen::Lower>();
-  if (right) *right = b;
+  normal = h.selfadjointView<Eigen::Lower>();
+  right = b;
   return squares;
 }
 
-bool ContourFit::solve(ContourModel& model, int max_iterations, double converged, double robust) {
+bool ContourFit::solve(ContourModel& model, int max_iterations, double converged, double robust, bool weigh_first) {
   double rate = 1;
+  weigh_next_ = weigh_first;
+  correct_next_ = !rough_ && !corrected(model);
   for (int i = 0; i < 5; ++i) {
     if (!iterate(model, max_iterations, converged, robust, rate)) return false;
     if (corrected(model)) break;
-    correct(model);
+    correct_next_ = true;
   }
   return true;
 }
@@ -299,7 +330,7 @@ bool ContourFit::iterate(ContourModel& model, int max_iterations, double converg
   };
   Matrix h;
   Vector b;
-  double squares = evaluate(model, robust, &h, &b), lambda = 1e-3, before = 0;
+  double squares = evaluate(model, robust, h, b), lambda = 1e-3, before = 0;
   double loss = with_prior(model, squares, &h, &b);
   bool current = true;  // what is expected is the model's
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
@@ -320,7 +351,7 @@ bool ContourFit::iterate(ContourModel& model, int max_iterations, double converg
     Vector next_b;
     if (better) {
       current = false;
-      const double next_squares = evaluate(next, robust, &next_h, &next_b);
+      const double next_squares = evaluate(next, robust, next_h, next_b);
       const double next_loss = with_prior(next, next_squares, &next_h, &next_b);
       better = next_loss <= loss * (1 + 1e-6);
       if (better) {
@@ -343,7 +374,9 @@ bool ContourFit::iterate(ContourModel& model, int max_iterations, double converg
     lambda *= 10;
     if (lambda > 1e6) break;
   }
-  if (!current) expect(model, false);
+  if (!current)
+    for_each_residual(model,
+                      [](const Block&, const BlurredEllipse::Share&, const Lanes&, const Lanes&, const Lanes&) {});
   squares_ = squares;
   information_ = h;
   return std::isfinite(squares);

@@ -59,19 +59,20 @@ class ContourFit {
       : plane_(plane), origin_(origin), unit_(unit), sum_(sum) {}
 
   /// Takes the pixels of the band about a model's contour; `sectors` parts of the contour, equal in the ellipse's own
-  /// angle. inner_ratio: 0, or what is expected of a ring's.
-  void gather(const Ellipse& ellipse, const ContourModel& model, const BandWidth& band, int sectors,
-              double inner_ratio);
+  /// angle. inner_ratio: 0, or what is expected of a ring's. rough: for an answer that is but a start, so a quick sum is
+  /// only corrected where it is far off.
+  void gather(const Ellipse& ellipse, const ContourModel& model, const BandWidth& band, int sectors, double inner_ratio,
+              bool rough);
   /// What the model expects of each pixel, for weigh, measure_sectors and robust_scale; solve leaves its answer's.
-  /// near: of a quick sum, whether it is corrected here, since the answer is not far.
-  void expect(const ContourModel& model, bool near);
+  void expect(const ContourModel& model);
   /// Weights of the pixels by the expected values; clipped ones (by value or by what is expected) and those of sectors
   /// that are not used count nothing.
   void weigh();
 
   /// Levenberg-Marquardt. robust > 0: the Geman-McClure loss r² / (1 + r²), r in units of `robust` standard deviations.
   /// False where it left its basin. converged: squared length of a step, in standard deviations, that ends it.
-  bool solve(ContourModel& model, int max_iterations, double converged, double robust);
+  /// weigh_first: as expect and weigh would at the start, in the same pass.
+  bool solve(ContourModel& model, int max_iterations, double converged, double robust, bool weigh_first = false);
 
   /// Residuals by sector, pixels of unused sectors included; tolerance: of the values.
   void measure_sectors(double tolerance);
@@ -110,13 +111,13 @@ class ContourFit {
     Part part = Part::edge;
   };
   void set(const ContourModel& model);
-  /// The quick share, uncorrected.
-  void look(Block& block, BlurredEllipse::Share& share) const;
-  /// Makes the quick share the exact one at this model.
-  void correct(const ContourModel& model);
   bool iterate(ContourModel& model, int max_iterations, double converged, double robust, double& rate);
   bool corrected(const ContourModel& model) const;
-  double evaluate(const ContourModel& model, double robust, ContourModel::Matrix* normal, ContourModel::Vector* right);
+  double evaluate(const ContourModel& model, double robust, ContourModel::Matrix& normal, ContourModel::Vector& right);
+  void start_weighing();
+  void weigh(Block& block);
+  /// Sets what is expected of each pixel, and calls body(block, share, light, plain light, residual). Where
+  /// correct_next_ says so the quick share is made the exact one at this model.
   template <class Body>
   void for_each_residual(const ContourModel& model, Body&& body);
 
@@ -129,8 +130,8 @@ class ContourFit {
   BlurredEllipse exact_;
   CurvedEdge outer_, inner_;
   bool quick_ = false;  // of the pixels that were gathered
-  bool near_ = false;   // the model is near its answer
-  ContourModel corrected_at_;
+  bool rough_ = false, correct_next_ = false, weigh_next_ = false, all_used_ = true;
+  ContourModel corrected_at_, feet_at_;
   double curvature_ = 0;    // the largest κ s
   double inner_ratio_ = 0;  // 0: no ring
   double squares_ = 0, jitter_px_ = 0, noise_scale_ = 1;

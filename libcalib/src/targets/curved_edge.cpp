@@ -44,9 +44,12 @@ void CurvedEdge::find(const BlurredEllipse::Pixels& pixels, Foot& foot) const {
   for (int i = 0; i < 3; ++i) approach(x, y, foot);
 }
 
-void CurvedEdge::add(const BlurredEllipse::Pixels& pixels, Foot& foot, BlurredEllipse::Share& share) const {
+void CurvedEdge::follow(const BlurredEllipse::Pixels& pixels, Foot& foot) const {
+  approach(pixels.x - all(cx_), pixels.y - all(cy_), foot);
+}
+
+void CurvedEdge::add(const BlurredEllipse::Pixels& pixels, const Foot& foot, BlurredEllipse::Share& share) const {
   const Lanes x = pixels.x - all(cx_), y = pixels.y - all(cy_);
-  approach(x, y, foot);
   const Place p = place(foot);
   const Lanes per_t = inverse_root(p.t2), nx = p.ty * per_t, ny = -p.tx * per_t;
   const Lanes per_s = all(1 / s_), distance = ((x - p.qx) * nx + (y - p.qy) * ny) * per_s, square = distance * distance;

@@ -29,9 +29,10 @@ class CurvedEdge {
 
   /// From nowhere: to about 1e-3 where the pixels are nearer than the centres of curvature.
   void find(const BlurredEllipse::Pixels& pixels, Foot& foot) const;
-  /// Adds this contour's part to `share`; `foot`, of a contour that lay nearly the same, is made this one's (a step of
-  /// Newton's).
-  void add(const BlurredEllipse::Pixels& pixels, Foot& foot, BlurredEllipse::Share& share) const;
+  /// Makes the feet of a contour that lay nearly the same this one's (a step of Newton's).
+  void follow(const BlurredEllipse::Pixels& pixels, Foot& foot) const;
+  /// Adds this contour's part to `share`. Feet that are off by an angle t make the distance wrong by t² of a radius.
+  void add(const BlurredEllipse::Pixels& pixels, const Foot& foot, BlurredEllipse::Share& share) const;
 
  private:
   struct Place {

@@ -21,15 +21,15 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3f;
 
-Vector3f linear_color(const Rgb& c) {
-  return {linear_from_srgb(float(c[0]) / 255), linear_from_srgb(float(c[1]) / 255),
-          linear_from_srgb(float(c[2]) / 255)};
-}
+// Solid light circles that are this little lighter than their paper, over the ink's contrast, and less are not told
+// from it.
+constexpr double kLeastLightContrast = 0.15;
 
 // Designs that are looked for on one plane of the photograph, with one pitch in radii of their circles.
 struct Search {
   Vector3f weights{0, 0, 0};
   double pitch_in_radii = 4;
+  bool solid_light = false;
   std::vector<int> designs;  // one a family
 };
 
@@ -41,20 +41,19 @@ std::vector<Search> searches_of(const TargetSet& set) {
     for (Search& s : searches) {
       if (weights.dot(s.weights) < 0.97f * weights.norm() * s.weights.norm()) continue;
       if (pitch > 1.1 * s.pitch_in_radii || s.pitch_in_radii > 1.1 * pitch) continue;
+      if (s.solid_light != d.solid_light) continue;
       // Equal targets of several sizes look the same: the board tells them apart.
-      const bool known = std::any_of(s.designs.begin(), s.designs.end(), [&](int other) {
-        return set.designs[std::size_t(other)].family == d.family &&
-               set.designs[std::size_t(other)].solid_light == d.solid_light;
-      });
+      const bool known = std::any_of(s.designs.begin(), s.designs.end(),
+                                     [&](int other) { return set.designs[std::size_t(other)].family == d.family; });
       if (!known) s.designs.push_back(design);
       return;
     }
-    searches.push_back({weights, pitch, {design}});
+    searches.push_back({weights, pitch, d.solid_light, {design}});
   };
   for (int i = 0; i < int(set.designs.size()); ++i) {
     const TargetDesign& d = set.designs[std::size_t(i)];
     if (d.family.kind() != TargetKind::circles) continue;
-    const Vector3f weights = contrast_weights(linear_color(d.ink), linear_color(d.paper));
+    const Vector3f weights = circle_weights(d);
     add(weights, i);
     // The same pattern in black on white is not seen on a difference of channels.
     if (weights.sum() < 0.6f * weights.cwiseAbs().sum()) add(Vector3f(.25f, .5f, .25f), i);
@@ -145,9 +144,11 @@ TargetDetector::TargetDetector(TargetSet set, DetectOptions options) {
   set.validate();
   options.validate();
   for (const TargetDesign& d : set.designs)
-    if (d.solid_light)
-      throw Error(ErrorCode::unsupported,
-                  "light circles without rings can be printed, but are not found yet: print rings", d.family.name());
+    if (d.solid_light && look_of(d).light_contrast < kLeastLightContrast)
+      throw Error(
+          ErrorCode::unsupported,
+          "light circles without rings are hardly lighter than their paper: print rings, or a darker paper colour",
+          d.family.name());
   impl_ = std::make_unique<const Impl>(std::move(set), std::move(options));
 }
 TargetDetector::TargetDetector(TargetDetector&&) noexcept = default;
@@ -166,13 +167,18 @@ void TargetDetector::Impl::find_circles(const Image& photo, Job& job, Detections
   LightPlane plane;
   for (std::size_t s = 0; s < searches.size(); ++s) {
     const Search& search = searches[s];
-    if (s == 0 || search.weights != searches[s - 1].weights) {
+    if (s == 0 || search.weights != searches[s - 1].weights || search.solid_light != searches[s - 1].solid_light) {
       plane = {};
       const GreyPyramid grey = grey_pyramid(bytes, {search.weights[0], search.weights[1], search.weights[2]}, job);
       if (options.ink_key && s == 0) ink = key_pyramid(bytes, *options.ink_key, job);
       BlobOptions blob_options;
       blob_options.min_circle_px = options.min_circle_px;
+      blob_options.both_kinds = search.solid_light;
       blobs = find_blobs(grey, options.ink_key ? &ink : nullptr, blob_options, job);
+      if (search.solid_light) {
+        const std::vector<Blob> light = find_blobs(negative(grey, job), nullptr, blob_options, job);
+        blobs.insert(blobs.end(), light.begin(), light.end());
+      }
     }
     int least = 1000;
     for (const int d : search.designs) least = std::min(least, set.designs[std::size_t(d)].family.grid());

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "contour_band.h"
-#include "dual_conic_start.h"
+#include "ellipse_starts.h"
 #include "lanes.h"
 
 namespace lumihull::calib {

@@ -9,7 +9,7 @@
 
 #include "contour_band.h"
 #include "contour_fit.h"
-#include "dual_conic_start.h"
+#include "ellipse_starts.h"
 
 namespace lumihull::calib {
 namespace {
@@ -101,20 +101,19 @@ enum class Effort : std::uint8_t {
 /// rest, or no answer.
 bool fit_band(ContourFit& pixels, ContourModel& model, double noise, Effort effort, bool last) {
   const double converged = last ? 1e-5 : 1e-2;  // squared length of a step, in standard deviations
-  pixels.expect(model, last);
-  pixels.weigh();
   const auto tolerance = [&] { return kSectorTolerance * std::abs(model.p[ContourModel::step]); };
   if (effort == Effort::plain) {
     const ContourModel start = model;
-    if (pixels.solve(model, 20, converged, 0)) {
+    if (pixels.solve(model, 20, converged, 0, true)) {
+      if (!last) return true;  // disturbances show in the second round
       pixels.measure_sectors(tolerance());
       if (!judge_sectors(pixels.sectors())) return true;
     }
     for (ContourFit::Sector& s : pixels.sectors()) s.used = true;
     model = start;
-    pixels.expect(model, last);
-    pixels.weigh();
   }
+  pixels.expect(model);
+  pixels.weigh();
   // A fit that disturbances do not pull shows where they are: large residuals count ever less.
   const double step = std::abs(model.p[ContourModel::step]) / noise;
   for (const double share : {0.3, 0.1, 0.0}) {
@@ -161,7 +160,7 @@ EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const Elli
   bool ring = false;
   for (int round = 0; round < 2; ++round) {
     const BandWidth band = band_of(model.p[ContourModel::blur], ellipse.b, options.inner_ratio, round > 0, ring);
-    pixels.gather(ellipse, model, band, sectors, ring ? options.inner_ratio : 0);
+    pixels.gather(ellipse, model, band, sectors, ring ? options.inner_ratio : 0, round == 0);
     if (pixels.gathered() < 2 * ContourModel::kSize) return fit;
     if (!fit_band(pixels, model, start_noise, effort, round > 0)) {
       fit.visible = visible_share(pixels.sectors(), ellipse);
@@ -222,20 +221,64 @@ bool near_guess(const Ellipse& e, const Ellipse& guess) {
          std::abs(e.b - guess.b) <= 2 + 0.15 * guess.b;
 }
 
+/// Levels on both sides of a contour, for a start: means over eight directions.
+void look_at_levels(const LightPlane& plane, const Ellipse& e, double s, double inner_ratio, double& inside,
+                    double& outside) {
+  // Of a ring the middle of its wall; both at least where little of the other level is seen.
+  const double inward = inner_ratio > 0 ? 0.5 * (1 - inner_ratio) : std::min(0.8, 2 * s / e.b), outward = 2 * s / e.b;
+  Ellipse in = e, out = e;
+  in.a *= 1 - inward, in.b *= 1 - inward;
+  out.a *= 1 + std::min(outward, kHighestRatio - 1), out.b *= 1 + std::min(outward, kHighestRatio - 1);
+  const auto mean = [&](const Ellipse& ring) {
+    double sum = 0;
+    for (int k = 0; k < 8; ++k) {
+      const Eigen::Vector2d p = ring.point(std::numbers::pi * k / 4);
+      const int x = std::clamp(int(p.x()), 0, plane.values.width() - 1),
+                y = std::clamp(int(p.y()), 0, plane.values.height() - 1);
+      sum += double(plane.values.row<float>(y)[x]);
+    }
+    return sum / 8;
+  };
+  inside = mean(in), outside = mean(out);
+}
+
 }  // namespace
 
 EllipseFit fit_ellipse(const LightPlane& plane, const Ellipse& guess, const EllipseOptions& options) {
   options.validate();
-  EllipseFit start = dual_conic_start(plane, guess, options, false);
+  return fit_ellipse(plane, guess, options, 0);
+}
+
+EllipseFit fit_ellipse(const LightPlane& plane, const Ellipse& guess, const EllipseOptions& options, double blur_px) {
+  EllipseFit start, fit;
+  const auto plain_fit = [&] {
+    fit = fit_from(plane, start, options, Effort::plain);
+    if (fit.state == EllipseState::good && !near_guess(fit.ellipse, guess)) fit.state = EllipseState::no_fit;
+  };
+  const auto settled = [&] {
+    return (fit.state == EllipseState::good && fit.visible > 0.9) || fit.state == EllipseState::saturated ||
+           fit.state == EllipseState::at_border;
+  };
+  // Where the blur is known the guess itself may do for a start.
+  const PixelBox picture{0, 0, plane.values.width(), plane.values.height()};
+  if (blur_px > 0 && guess.b >= 1 && contains(picture, guess, 1)) {
+    start.ellipse = guess;
+    start.blur_px = blur_px;
+    look_at_levels(plane, guess, std::sqrt(blur_px * blur_px + 1.0 / 12), options.inner_ratio, start.inside,
+                   start.outside);
+    if (start.inside != start.outside) {
+      plain_fit();
+      if (fit.state == EllipseState::good && fit.visible > 0.9) return fit;
+    }
+  }
+  start = dual_conic_start(plane, guess, options, false);
   const bool started = start.state == EllipseState::good;
   if (!started && start.state != EllipseState::no_fit) return start;
   if (start.inside == start.outside) return start;  // nothing was looked at
-  EllipseFit fit = start;
+  fit = start;
   if (started) {
-    fit = fit_from(plane, start, options, Effort::plain);
-    if (fit.state == EllipseState::good && !near_guess(fit.ellipse, guess)) fit.state = EllipseState::no_fit;
-    if (fit.state == EllipseState::good && fit.visible > 0.9) return fit;
-    if (fit.state == EllipseState::saturated || fit.state == EllipseState::at_border) return fit;
+    plain_fit();
+    if (settled()) return fit;
   }
   // The dual conic is drawn off by whatever edge is near; the guess may not be.
   start.ellipse = guess;

@@ -18,7 +18,7 @@ constexpr int kBand = 64;  // rows that a thread takes at a time; even, so that 
 void halve_rows(const GreyLevel& from, GreyLevel& to, int first, int last) {
   for (int y = first; y < last; ++y) {
     const std::uint8_t *a = from.row(2 * y), *b = from.row(2 * y + 1);
-    std::uint8_t* out = to.pixels.data() + std::size_t(y) * std::size_t(to.width);
+    std::uint8_t* out = to.pixels.row<std::uint8_t>(y);
     for (int x = 0; x < to.width; ++x)
       out[x] = std::uint8_t((a[2 * x] + a[2 * x + 1] + b[2 * x] + b[2 * x + 1] + 2) >> 2);
   }
@@ -28,7 +28,7 @@ GreyLevel half_of(const GreyLevel& level) {
   GreyLevel half;
   half.width = level.width / 2;
   half.height = level.height / 2;
-  half.pixels.resize(std::size_t(half.width) * std::size_t(half.height));
+  half.pixels = Image::uninitialized(half.width, half.height, 1);
   return half;
 }
 
@@ -67,13 +67,10 @@ GreyLevel base_level(const Image& photo, bool borrow) {
   if (borrow)
     level.borrowed = photo.row<std::uint8_t>(0);
   else
-    level.pixels.resize(std::size_t(level.width) * std::size_t(level.height));
+    level.pixels = Image::uninitialized(level.width, level.height, 1);
   return level;
 }
 
-std::uint8_t* mutable_row(GreyLevel& level, int y) {
-  return level.pixels.data() + std::size_t(y) * std::size_t(level.width);
-}
 
 }  // namespace
 
@@ -112,18 +109,35 @@ GreyPyramid grey_pyramid(const Image& photo, const std::array<float, 3>& weights
   const int r = w[0], g = w[1], b = w[2];
   return build(base_level(photo, false), job, [&photo, r, g, b, offset](int y, GreyLevel& level) {
     const std::uint8_t* in = photo.row<std::uint8_t>(y);
-    std::uint8_t* out = mutable_row(level, y);
+    std::uint8_t* out = level.pixels.row<std::uint8_t>(y);
     const int width = level.width;
     for (int x = 0; x < width; ++x)
       out[x] = std::uint8_t(std::min((r * in[3 * x] + g * in[3 * x + 1] + b * in[3 * x + 2] + offset) >> 8, 255));
   });
 }
 
+GreyPyramid negative(const GreyPyramid& pyramid, Job& job) {
+  GreyPyramid negatives;
+  for (const GreyLevel& level : pyramid) {
+    GreyLevel& to = negatives.emplace_back();
+    to.width = level.width, to.height = level.height;
+    to.pixels = Image::uninitialized(to.width, to.height, 1);
+    parallel_chunks(job, std::size_t(to.height), kBand, [&](std::size_t first, std::size_t last) {
+      for (std::size_t y = first; y < last; ++y) {
+        const std::uint8_t* in = level.row(int(y));
+        std::uint8_t* out = to.pixels.row<std::uint8_t>(int(y));
+        for (int x = 0; x < to.width; ++x) out[x] = std::uint8_t(255 - in[x]);
+      }
+    });
+  }
+  return negatives;
+}
+
 GreyPyramid key_pyramid(const Image& photo, const ColorKey& ink, Job& job) {
   return build(base_level(photo, false), job, [&](int y, GreyLevel& level) {
     std::vector<std::uint64_t> bits((std::size_t(level.width) + 63) / 64);
     ink.decide(photo.row<std::uint8_t>(y), std::size_t(level.width), bits.data());
-    std::uint8_t* out = mutable_row(level, y);
+    std::uint8_t* out = level.pixels.row<std::uint8_t>(y);
     for (int x = 0; x < level.width; ++x) out[x] = std::uint8_t((bits[std::size_t(x) >> 6] >> (x & 63) & 1) - 1);
   });
 }

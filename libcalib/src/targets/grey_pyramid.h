@@ -14,11 +14,11 @@ namespace lumihull::calib {
 /// their order and rough differences matter here; contours are measured elsewhere, in linear light.
 struct GreyLevel {
   int width = 0, height = 0;
-  std::vector<std::uint8_t> pixels;        ///< empty where `borrowed` is set
+  Image pixels;                            ///< empty where `borrowed` is set
   const std::uint8_t* borrowed = nullptr;  ///< a grey photograph's own pixels
 
   const std::uint8_t* row(int y) const {
-    return (borrowed ? borrowed : pixels.data()) + std::size_t(y) * std::size_t(width);
+    return (borrowed ? borrowed : pixels.row<std::uint8_t>(0)) + std::size_t(y) * std::size_t(width);
   }
 };
 
@@ -33,6 +33,9 @@ const Image& eight_bit(const Image& photo, Image& storage);
 /// Σ weights · (red, green, blue), |weights| scaled to sum 1 and shifted so that black to white fits into 0 … 255; grey
 /// photographs (1 channel) as they are. photo: 8 bits, outlives the pyramid.
 GreyPyramid grey_pyramid(const Image& photo, const std::array<float, 3>& weights, Job& job);
+
+/// 255 less each value.
+GreyPyramid negative(const GreyPyramid& pyramid, Job& job);
 
 /// 0 where the key says object (ink), 255 elsewhere. photo: 8 bits, 3 channels.
 GreyPyramid key_pyramid(const Image& photo, const ColorKey& ink, Job& job);

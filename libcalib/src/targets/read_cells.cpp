@@ -152,7 +152,7 @@ CellReading read_cells(const LightPlane& plane, std::span<const Ellipse> circles
   for (std::size_t i = 0; i < n; ++i) {
     if (!seen[i] || states[i] != EllipseState::good) continue;
     const double x = darkness[i] / reference;
-    double light = 0;  // what x is of a light circle
+    double light = -look.light_contrast;  // what x is of a light circle
     if (!look.solid_light) {
       // Averaging is a blur, too: the places' variance along an axis is about a third of the radius squared.
       const double a = circles[i].a, b = circles[i].b, averaged = 0.29 * within * within;
@@ -168,8 +168,10 @@ CellReading read_cells(const LightPlane& plane, std::span<const Ellipse> circles
     if (apart < 6 * noise || apart < 0.08) continue;
     reading.separation = std::max(reading.separation, apart * reference);
     const double zone = 0.15 * apart;
-    if (x > middle + zone && x < 1 + 0.5 * apart + 4 * noise) reading.cells[i] = Cell::dark;
-    if (x < middle - zone && (look.solid_light || x > light - 0.6 * apart - 4 * noise)) reading.cells[i] = Cell::light;
+    const double dark_from = look.solid_light ? 0.5 : middle + zone,
+                 light_to = look.solid_light ? 0.5 * light : middle - zone;
+    if (x > dark_from && x < 1 + 0.5 * apart + 4 * noise) reading.cells[i] = Cell::dark;
+    if (x < light_to && x > light - 0.6 * apart - 4 * noise) reading.cells[i] = Cell::light;
     if (reading.cells[i] != Cell::unknown)
       reading.worst = std::max(reading.worst, std::abs(x - (reading.cells[i] == Cell::dark ? 1 : light)) / apart);
   }

@@ -13,6 +13,8 @@ namespace lumihull::calib {
 struct CircleLook {
   double ring_ratio = 0.55;  ///< radius of a ring's light centre / outer radius
   bool solid_light = false;  ///< light circles are discs lighter than the paper
+  /// Of solid light ones: what they are lighter than the paper by, over what dark ones are darker by; > 0.
+  double light_contrast = 1;
 };
 
 /// What the cells of a grid are, and how well they tell themselves apart.
@@ -33,6 +35,7 @@ struct CellReading {
 /// Light is counted relative to the paper between the circles, so that shading drops out. How light the centre of a
 /// ring becomes depends on blur: with s = sigma / semi-axes, a disc of light keeps P(|N(0, s²)| < 1) of its contrast at
 /// its centre; dark and light centres are told apart halfway between what both should be, the zone between is unknown.
+/// Solid light circles lie on the paper's other side: what is nearer to the paper than half of the way is unknown.
 CellReading read_cells(const LightPlane& plane, std::span<const Ellipse> circles, std::span<const EllipseState> states,
                        int columns, int certainly_dark, const CircleLook& look);
 

@@ -6,10 +6,29 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <utility>
 
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
+
 namespace lumihull {
+namespace {
+
+/// Has the system back a large picture by large pages, where it does so on request: else touching one for the first
+/// time costs as much as the simpler computations on it.
+void ask_for_large_pages([[maybe_unused]] std::byte* data, [[maybe_unused]] std::size_t bytes) {
+#if defined(__linux__)
+  constexpr std::size_t kPage = std::size_t(2) << 20;
+  const std::size_t begin = (reinterpret_cast<std::uintptr_t>(data) + kPage - 1) / kPage * kPage,
+                    end = (reinterpret_cast<std::uintptr_t>(data) + bytes) / kPage * kPage;
+  if (bytes >= 2 * kPage && begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+#endif
+}
+
+}  // namespace
 
 Image Image::uninitialized(int width, int height, int channels, PixelType type) {
   const std::string size = std::to_string(width) + " x " + std::to_string(height) + " x " + std::to_string(channels);
@@ -28,6 +47,7 @@ Image Image::uninitialized(int width, int height, int channels, PixelType type) 
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::out_of_memory, "no memory for a picture of " + size);
   }
+  ask_for_large_pages(image.data(), image.bytes());
   return image;
 }
 

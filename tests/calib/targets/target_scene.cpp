@@ -74,23 +74,22 @@ OneTarget one_target(const TargetDesign& design, double minor_px, double tilt, c
   return one;
 }
 
+Vector2d true_center(const Camera& camera, const TargetDesign& design, const PlacedTarget& truth, int feature) {
+  const Vector2d p = design.feature(feature);
+  calib::Circle3 circle;
+  circle.center = truth.cam_from_target * Vector3d(p.x(), p.y(), 0);
+  circle.u = truth.cam_from_target.rotation * Vector3d::UnitX();
+  circle.v = truth.cam_from_target.rotation * Vector3d::UnitY();
+  circle.radius = design.circle_radius_m();
+  return calib::projected_circle_center(camera, circle).value();
+}
+
 double center_error(const Camera& camera, const TargetDesign& design, const PlacedTarget& truth,
                     const calib::Detection& found) {
   double sum = 0;
-  int n = 0;
-  for (const calib::Feature& f : found.features) {
-    const Vector2d p = design.feature(f.index);
-    calib::Circle3 circle;
-    circle.center = truth.cam_from_target * Vector3d(p.x(), p.y(), 0);
-    circle.u = truth.cam_from_target.rotation * Vector3d::UnitX();
-    circle.v = truth.cam_from_target.rotation * Vector3d::UnitY();
-    circle.radius = design.circle_radius_m();
-    const auto center = calib::projected_circle_center(camera, circle);
-    if (!center) return -1;
-    sum += (*center - f.pixel).squaredNorm();
-    ++n;
-  }
-  return n > 0 ? std::sqrt(sum / n) : -1;
+  for (const calib::Feature& f : found.features)
+    sum += (true_center(camera, design, truth, f.index) - f.pixel).squaredNorm();
+  return found.features.empty() ? -1 : std::sqrt(sum / double(found.features.size()));
 }
 
 }  // namespace lumihull::test

@@ -45,6 +45,10 @@ OneTarget one_target(const calib::TargetDesign& design, double minor_px, double 
                      const rig::PrintPhotoOptions& options, std::uint64_t seed,
                      const Eigen::Vector3f& background = {.1f, .3f, .1f});
 
+/// Where the centre of a circle's picture is.
+Eigen::Vector2d true_center(const Camera& camera, const calib::TargetDesign& design, const PlacedTarget& truth,
+                            int feature);
+
 /// Root of the mean squared distance between measured centres and the truth, px; -1 without features.
 double center_error(const Camera& camera, const calib::TargetDesign& design, const PlacedTarget& truth,
                     const calib::Detection& found);

@@ -21,7 +21,9 @@ struct Circle3 {
 /// centre = (C*02, C*12) / C*22: the picture of the point X - (R²/z) (e₃ - n n_z). Through a lens the contour is no
 /// conic: the prediction is the centre of the ellipse that lies closest to the distorted contour (squared distances
 /// along the normal, by arc length), which is what `fit_ellipse` and, with weights of its own, the dual-conic operator
-/// see.
+/// see. Where a circle is seen from so near its edge that nobody measures it (ratio of the axes below about a fifth)
+/// the contour may be bent by as much as it is wide; from 0.2 to 0.12 the prediction goes over, smoothly, into the picture of
+/// the point above, which lies off by what distortion bends the contour by.
 ///
 /// circle: in the camera's frame; u, v orthonormal. jacobian: d pixel / d (camera-frame rigid motion: rotation vector
 /// about the camera's origin, translation), 2 x 6. by_parameters: d pixel / d (f, s, skew, u0, v0, k1, k2, k3, p1, p2),

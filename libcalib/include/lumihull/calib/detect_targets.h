@@ -27,7 +27,8 @@ struct LUMIHULL_API DetectOptions {
 /// Finds, reads and measures the targets of a set in photographs. Immutable: any number of threads may detect.
 class LUMIHULL_API TargetDetector {
  public:
-  /// Errors: invalid_argument (set, options), unsupported (a design with solid_light: these are not found yet).
+  /// Errors: invalid_argument (set, options), unsupported (a design with solid_light whose paper is nearly
+  /// as light as bare paper).
   explicit TargetDetector(TargetSet set, DetectOptions options = {});
   TargetDetector(TargetDetector&&) noexcept;
   ~TargetDetector();
