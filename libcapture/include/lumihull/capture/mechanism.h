@@ -46,8 +46,9 @@ struct Mechanism {
   double gravity_m_s2 = 9.80665;  ///< along -z
   MotionLimits limits;
 
-  /// Where the camera sits while the bearing's angle is zero. The camera turns about its own optical axis:
-  /// cam_from_platform(roll) = Rz(roll) * cam_from_platform (paper, 2.3: gravity turns it, a solenoid locks it).
+  /// Where the camera sits while the bearing's angle is zero. The bearing is about the platform's z axis, from which
+  /// the optical axis is offset: cam_from_platform(roll) = cam_from_platform * Rz(-roll), so that the camera faces the
+  /// same way in the hemisphere's meridian where roll is the azimuth (paper, 2.3: gravity turns it, a solenoid locks it).
   Pose cam_from_platform;
 };
 
