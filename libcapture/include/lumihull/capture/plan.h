@@ -44,6 +44,9 @@ struct Plan {
 /// that are not those of the pose (beyond 1 µm) or outside a cable's limits, too many stops or cameras.
 LUMIHULL_API void check(const Plan& plan, const std::string& subject = "plan");
 
+/// Travel, settling and exposures of all stops, s; an operator's pauses are not in it.
+LUMIHULL_API double duration_s(const Plan& plan);
+
 /// plan.json ("format": "lumihull-plan"). Errors: not_found, io, bad_input naming file, pointer, expectation.
 LUMIHULL_API Plan read_plan(const std::filesystem::path& file);
 LUMIHULL_API void write_plan(const Plan& plan, const std::filesystem::path& file);
