@@ -7,7 +7,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
+#include <limits>
 #include <map>
+#include <numeric>
+#include <queue>
 #include <unordered_map>
 #include <utility>
 
@@ -53,6 +57,7 @@ class Planner {
     keep_stops_that_can_be_taken();
     if (views_.thin) gather_in_columns();
     make_groups();
+    keep_largest_part();
     std::vector<int> order;
     for (const Group& group : groups_) {
       if (group.turn >= 0) order.push_back(group.turn);
@@ -64,6 +69,7 @@ class Planner {
   PlannedTour shortest() {
     keep_stops_that_can_be_taken();
     make_groups();
+    keep_largest_part();
     std::vector<int> order;
     job_.begin("ordering the stops", groups_.size());
     for (std::size_t g = 0; g < groups_.size(); ++g) {
@@ -198,6 +204,113 @@ class Planner {
     return {};
   }
 
+  /// Straight lines between neighbours that are open; stops beyond the largest connected part are left out.
+  void keep_largest_part() {
+    constexpr std::size_t kNeighbours = 10;
+    const int n = int(stops_.size());
+    struct Line {
+      int to;
+      Way way;
+    };
+    std::vector<std::vector<Line>> lines(std::size_t(n), std::vector<Line>{});
+    job_.begin("ways between the stops", std::uint64_t(n));
+    parallel_for(
+        job_, std::size_t(n),
+        [&](std::size_t i) {
+          std::vector<std::pair<double, int>> near;
+          for (int j = 0; j < n; ++j)
+            if (j != int(i)) near.emplace_back(motion_distance(mechanism_, pose(int(i)), pose(j)), j);
+          const std::size_t count = std::min(kNeighbours, near.size());
+          std::partial_sort(near.begin(), near.begin() + std::ptrdiff_t(count), near.end());
+          near.resize(count);
+          if (int(i) + 1 < n) near.emplace_back(0, int(i) + 1);  // the next one down the same azimuth
+          for (const auto& [distance, j] : near) lines[i].push_back({j, finder_.straight(pose(int(i)), pose(j))});
+        },
+        true);
+    job_.end();
+    std::vector<int> part(std::size_t(n), 0);
+    std::iota(part.begin(), part.end(), 0);
+    const std::function<int(int)> root = [&](int i) {
+      while (part[std::size_t(i)] != i) i = part[std::size_t(i)] = part[std::size_t(part[std::size_t(i)])];
+      return i;
+    };
+    roads_.assign(std::size_t(n), {});
+    for (int i = 0; i < n; ++i)
+      for (const Line& line : lines[std::size_t(i)]) {
+        if (!line.way.open) continue;
+        roads_[std::size_t(i)].emplace_back(line.to, line.way.duration_s);
+        roads_[std::size_t(line.to)].emplace_back(i, line.way.duration_s);
+        part[std::size_t(root(i))] = root(line.to);
+      }
+    // A stop counts where its camera can be turned, too.
+    std::map<int, std::size_t> photographs;
+    for (const Group& group : groups_)
+      for (const int i : group.stops) photographs[root(i)] += group.turn < 0 || root(group.turn) == root(i);
+    const int largest = std::max_element(photographs.begin(), photographs.end(), [](const auto& a, const auto& b) {
+                          return a.second < b.second;
+                        })->first;
+    std::map<std::string, int> why;
+    std::vector<Group> kept;
+    for (Group& group : groups_) {
+      const bool turned = group.turn < 0 || root(group.turn) == largest;
+      std::vector<int> reached;
+      for (const int i : group.stops) {
+        if (turned && root(i) == largest) {
+          reached.push_back(i);
+          continue;
+        }
+        tour_.left_out.push_back(stops_[std::size_t(i)].name);
+        std::string reason = "what lies between";
+        for (const int from : {i, group.turn})
+          if (from >= 0)
+            for (const Line& line : lines[std::size_t(from)])
+              if (!line.way.open) reason = line.way.why;
+        ++why[reason];
+      }
+      group.stops = std::move(reached);
+      if (!group.stops.empty()) kept.push_back(std::move(group));
+    }
+    for (const auto& [reason, count] : why)
+      tour_.left_out_why.push_back(std::to_string(count) + " stops can't be reached from the others: " + reason);
+    groups_ = std::move(kept);
+    if (groups_.empty()) throw Error(ErrorCode::degenerate, tour_.left_out_why.back(), mechanism_.name);
+  }
+
+  /// Straight, round what is in the way, or from stop to stop.
+  Way way(int a, int b) const {
+    Way found = finder_.find(pose(a), pose(b));
+    if (found.open) return found;
+    // Dijkstra 1959 over the open lines between neighbours.
+    std::vector<double> least(stops_.size(), std::numeric_limits<double>::infinity());
+    std::vector<int> before(stops_.size(), -1);
+    std::priority_queue<std::pair<double, int>, std::vector<std::pair<double, int>>, std::greater<>> open;
+    least[std::size_t(a)] = 0;
+    open.emplace(0, a);
+    while (!open.empty()) {
+      const auto [so_far, i] = open.top();
+      open.pop();
+      if (i == b) break;
+      if (so_far > least[std::size_t(i)]) continue;
+      for (const auto& [j, duration] : roads_[std::size_t(i)])
+        if (so_far + duration < least[std::size_t(j)]) {
+          least[std::size_t(j)] = so_far + duration;
+          before[std::size_t(j)] = i;
+          open.emplace(so_far + duration, j);
+        }
+    }
+    if (before[std::size_t(b)] < 0) return found;
+    found = Way();
+    found.open = true;
+    found.duration_s = least[std::size_t(b)];
+    for (int i = b; i != a; i = before[std::size_t(i)]) {
+      const int last = before[std::size_t(i)];
+      found.length_m += (pose(i).translation - pose(last).translation).norm();
+      if (last != a) found.via.push_back(pose(last));
+    }
+    std::reverse(found.via.begin(), found.via.end());
+    return found;
+  }
+
   static std::uint64_t key(int a, int b) {
     return (std::uint64_t(std::min(a, b)) << 32) | std::uint64_t(std::uint32_t(std::max(a, b)));
   }
@@ -210,8 +323,8 @@ class Planner {
   double way_s(int a, int b) {
     const auto [at, added] = ways_.try_emplace(key(a, b), 0);
     if (!added) return at->second;
-    const Way way = finder_.find(pose(a), pose(b));
-    return at->second = way.open ? way.duration_s : kBlocked_s;
+    const Way found = way(a, b);
+    return at->second = found.open ? found.duration_s : kBlocked_s;
   }
 
   /// Up one column and down the next; along one row and back the next.
@@ -255,13 +368,13 @@ class Planner {
       PlannedStop stop = stops_[std::size_t(order[k])];
       if (k > 0) {
         const PlannedStop& last = stops_[std::size_t(order[k - 1])];
-        const Way way = finder_.find(last.world_from_platform, stop.world_from_platform);
-        if (!way.open)
-          throw Error(ErrorCode::degenerate, "no way from " + last.name + " to " + stop.name + ": " + way.why,
+        const Way found = way(order[k - 1], order[k]);
+        if (!found.open)
+          throw Error(ErrorCode::degenerate, "no way from " + last.name + " to " + stop.name + ": " + found.why,
                       mechanism_.name);
-        tour_.travel_m += way.length_m;
-        tour_.travel_s += way.duration_s;
-        add_ways_round(way, last.roll_rad);
+        tour_.travel_m += found.length_m;
+        tour_.travel_s += found.duration_s;
+        add_ways_round(found, last.roll_rad);
         stop.travel_s =
             plan_move(mechanism_, plan.stops.back().world_from_platform, stop.world_from_platform).duration_s();
       }
@@ -304,7 +417,8 @@ class Planner {
   internal::WayFinder finder_;
   std::vector<PlannedStop> stops_;  // that are photographed, then where the camera is turned
   std::vector<Group> groups_;
-  std::unordered_map<std::uint64_t, double> ways_;  // s
+  std::vector<std::vector<std::pair<int, double>>> roads_;  // open lines to neighbours: to which stop, s
+  std::unordered_map<std::uint64_t, double> ways_;          // s
   PlannedTour tour_;
 };
 

@@ -18,11 +18,13 @@ Vector3d direction(double theta, double phi) {
 
 }  // namespace
 
-bool WayFinder::clear(const Pose& from, const Pose& to, std::string* why) const {
+bool WayFinder::clear(const Pose& from, const Pose& to, Way* why_not) const {
   if (const auto crossing = first_crossing(mechanism_, from, to)) {
-    if (why)
-      *why = "cables " + mechanism_.cables[std::size_t(crossing->first)].name + " and " +
-             mechanism_.cables[std::size_t(crossing->second)].name + " would cross";
+    if (why_not) {
+      why_not->crossing = true;
+      why_not->why = "cables " + mechanism_.cables[std::size_t(crossing->first)].name + " and " +
+                     mechanism_.cables[std::size_t(crossing->second)].name + " would cross";
+    }
     return false;
   }
   const double straight = (to.translation - from.translation).norm();
@@ -31,7 +33,7 @@ bool WayFinder::clear(const Pose& from, const Pose& to, std::string* why) const 
   for (int i = 1; i < steps; ++i) {
     const PoseJudgement judged = judge_pose(mechanism_, between(from, to, double(i) / steps), object_, limits_);
     if (judged.ok()) continue;
-    if (why) *why = judged.obstacles.front().text;
+    if (why_not) why_not->why = judged.obstacles.front().text;
     return false;
   }
   return true;
@@ -60,14 +62,18 @@ bool WayFinder::follow(const std::vector<Pose>& via, const Pose& from, const Pos
   return true;
 }
 
-Way WayFinder::find(const Pose& from, const Pose& to) const {
+Way WayFinder::straight(const Pose& from, const Pose& to) const {
   Way way;
-  if (clear(from, to, &way.why)) {
-    way.open = true;
-    way.length_m = (to.translation - from.translation).norm();
-    way.duration_s = plan_move(mechanism_, from, to).duration_s();
-    return way;
-  }
+  if (!clear(from, to, &way)) return way;
+  way.open = true;
+  way.length_m = (to.translation - from.translation).norm();
+  way.duration_s = plan_move(mechanism_, from, to).duration_s();
+  return way;
+}
+
+Way WayFinder::find(const Pose& from, const Pose& to) const {
+  Way way = straight(from, to);
+  if (way.open || way.crossing) return way;
   // Round it: along the great circle, or by way of a higher place between both azimuths, at the stops' radius and
   // farther out; in one, two or more straight lines. The shortest of those that are open is taken.
   const Vector3d a = from.translation - center_, b = to.translation - center_;

@@ -13,7 +13,8 @@ struct Way {
   bool open = false;
   std::vector<Pose> via;  ///< where the platform stops in between
   double length_m = 0, duration_s = 0;
-  std::string why;  ///< what is in the way of the straight line, where it is not open
+  bool crossing = false;  ///< cables cross on the straight line
+  std::string why;        ///< what is in the way of the straight line, where it is not open
 };
 
 class WayFinder {
@@ -22,11 +23,15 @@ class WayFinder {
   WayFinder(const Mechanism& mechanism, const KeepOut* object, const Eigen::Vector3d& center, const PoseLimits& limits)
       : mechanism_(mechanism), object_(object), center_(center), limits_(limits) {}
 
-  /// Between poses that both can be taken.
+  /// The straight line between poses that both can be taken.
+  Way straight(const Pose& from, const Pose& to) const;
+
+  /// Where something is in the straight line's way, round it. Cables that would cross are not led round each other:
+  /// they would still be on the wrong sides of each other.
   Way find(const Pose& from, const Pose& to) const;
 
  private:
-  bool clear(const Pose& from, const Pose& to, std::string* why) const;
+  bool clear(const Pose& from, const Pose& to, Way* why_not) const;
   bool follow(const std::vector<Pose>& via, const Pose& from, const Pose& to, Way& best) const;
 
   const Mechanism& mechanism_;

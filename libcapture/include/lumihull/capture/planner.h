@@ -87,8 +87,10 @@ struct PlannedTour {
 /// Or-opt on neighbour lists until nothing improves; then double-bridge kicks, kept where they help. The answer depends
 /// on the seed alone. Stops that can't be taken are left out.
 ///
-/// Errors: invalid_argument; degenerate: not one stop can be taken, the camera can't be turned, or some stop can't be
-/// reached from the others (the message says which cables and why).
+/// Stops that can't be reached from the most others are left out, too: where cables would cross on each way.
+///
+/// Errors: invalid_argument; degenerate: not one stop can be taken, or the camera can't be turned anywhere (the message
+/// says which cables and why).
 LUMIHULL_API PlannedTour plan_tour(const Mechanism& mechanism, const HemisphereOptions& views,
                                    const PlannerOptions& options, Job& job);
 
