@@ -304,7 +304,7 @@ void run(Program& program, const Arguments& a) {
   std::vector<PlacedTarget> targets;
   if (!a.targets.empty()) {
     targets = read_placed_targets(a.targets);
-  } else if (a.enclosure.targets > 0) {
+  } else if (a.enclosure.targets != 0) {
     Enclosure enclosure = a.enclosure;
     enclosure.center = views.center;
     enclosure.seed = a.seed;
@@ -364,7 +364,8 @@ void add_plan(Program& program) {
                    "azimuths that far on both sides share a bearing [8]");
   verb->add_option("--settle", a->settle, "until the swing has died out, s [7]");
   verb->add_option("--exposure", a->exposure, "s [0.5]");
-  verb->add_option("--travel", a->travel, "between views on a turntable [3] or in a hand [10], s");
+  verb->add_option("--travel", a->travel, "between views on a turntable [3] or in a hand [10], s")
+      ->check(CLI::NonNegativeNumber);
   verb->add_option("--clearance", a->clearance,
                    "of platform and cables to the object, of the platform to the room, m [0.05]");
   verb->add_option("--targets", a->targets, "targets on the walls: a list, or a capture's targets.json")
