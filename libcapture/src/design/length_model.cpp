@@ -6,7 +6,7 @@ namespace lumihull::capture::design {
 
 std::vector<std::string> LengthLayout::names(const Mechanism& mechanism, const std::vector<int>& group_numbers) const {
   static constexpr const char* kAxes[] = {" x", " y", " z"};
-  std::vector<std::string> out(std::size_t(size()));
+  std::vector<std::string> out(static_cast<std::size_t>(size()));
   const auto name = [&](int at, const std::string& words) { out[std::size_t(at)] = words; };
   for (int i = 0; i < cables; ++i) {
     const std::string& cable = mechanism.cables[std::size_t(i)].name;
