@@ -90,15 +90,15 @@ MapStyle style_of(WorkspaceValue value) {
       return {"Least tension of a cable", "N", "%.3g",
               [=](const PoseReport& p) { return p.balanced() ? p.tensions.tension_N.minCoeff() : none; }, false};
     case WorkspaceValue::clearance:
-      return {"Least clearance", "cm", "%.3g", [](const PoseReport& p) { return 100 * p.least_clearance_m(); }, false};
+      return {"Least clearance", "cm", "%.3g", [](const PoseReport& p) { return 100 * least_clearance_m(p.clearance); },
+              false};
     case WorkspaceValue::sight:
       return {"Angle between cables and the sight of the object", "°", "%.3g",
               [](const PoseReport& p) { return p.sight_rad / kDegree; }, false};
     case WorkspaceValue::rotation_sensitivity:
-      return {
-          "Turn of the platform for 1 mm of cable error", "°", "%.2g",
-          [=](const PoseReport& p) { return p.balanced() ? p.sensitivity.rotation_rad_per_m * 1e-3 / kDegree : none; },
-          true};
+      return {"Turn of the platform for 1 mm of cable error", "°", "%.2g",
+              [=](const PoseReport& p) { return p.balanced() ? p.sensitivity.rotation_each * 1e-3 / kDegree : none; },
+              true};
     case WorkspaceValue::balance:
       break;
   }

@@ -56,9 +56,9 @@ void check(const Workspace& w) {
   need(std::isfinite(w.tilt_factor) && std::isfinite(w.tilt_offset_rad), "expected a finite tilt");
 }
 
-double PoseReport::least_clearance_m() const {
-  return std::min({clearance.cable_cable, clearance.cable_platform, clearance.cable_object, clearance.platform_object,
-                   clearance.platform_room});
+double least_clearance_m(const Clearance& c) {
+  return std::min(
+      {c.cable_cable, c.cable_platform, c.cable_camera, c.cable_object, c.platform_object, c.platform_room});
 }
 
 int WorkspaceReport::paper_objective() const {
@@ -67,10 +67,10 @@ int WorkspaceReport::paper_objective() const {
   return sum;
 }
 
-double WorkspaceReport::coverage(double least_tension_N, double least_clearance_m) const {
+double WorkspaceReport::coverage(double least_tension_N, double clearance_m) const {
   const auto good = std::count_if(poses.begin(), poses.end(), [&](const PoseReport& p) {
     return p.balanced() && !p.crossing && p.tensions.tension_N.minCoeff() >= least_tension_N &&
-           p.least_clearance_m() >= least_clearance_m;
+           least_clearance_m(p.clearance) >= clearance_m;
   });
   return poses.empty() ? 0 : double(good) / double(poses.size());
 }

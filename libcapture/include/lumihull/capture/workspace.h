@@ -42,8 +42,11 @@ LUMIHULL_API void set_tilt(Workspace& workspace, double first_tilt_rad, double l
 /// Error{invalid_argument} naming the first value that is not finite or outside its range.
 LUMIHULL_API void check(const Workspace& workspace);
 
+/// The least of all distances.
+LUMIHULL_API double least_clearance_m(const Clearance& clearance);
+
 /// One pose of a workspace, judged.
-struct LUMIHULL_API PoseReport {
+struct PoseReport {
   Tensions tensions;
   Clearance clearance;
   Sensitivity sensitivity;  ///< infinite where not controlled
@@ -54,8 +57,6 @@ struct LUMIHULL_API PoseReport {
   std::optional<Crossing> crossing;  ///< on the way to the next pose
 
   bool balanced() const { return tensions.balance == Balance::controlled || tensions.balance == Balance::loose; }
-  /// The least of all clearances, m.
-  double least_clearance_m() const;
 };
 
 struct LUMIHULL_API WorkspaceReport {
@@ -68,7 +69,7 @@ struct LUMIHULL_API WorkspaceReport {
   /// Φ of the paper's eq. 1: poses with a crossing after them minus balanced poses; the ideal is -workspace.size().
   int paper_objective() const;
   /// Share of poses that are balanced with tensions and clearances of at least these, and no crossing after them.
-  double coverage(double least_tension_N, double least_clearance_m) const;
+  double coverage(double least_tension_N, double clearance_m) const;
 };
 
 /// Judges every pose. The way from a pose leads to the next one of the procedure: down along an azimuth; from its end
