@@ -54,12 +54,15 @@ double pose_shortfall(const Mechanism& mechanism, const DesignOptions& options, 
   const KeepOut* object = options.object ? &*options.object : nullptr;
   const Tensions t = tensions(mechanism, pose);
   const double sight = sight_rad(mechanism, pose, theta, workspace.center, object ? object->radius_m : 0);
+  // 1 / (L sigma_6) bounds the rotation; mostly that is enough to know.
+  double rotation = 1 / (characteristic_length(mechanism) * t.smallest_singular);
+  if (!(rotation <= goals.rotation_rad_per_m)) rotation = sensitivity(mechanism, pose).rotation_joint;
   const std::array<double, 5> terms = {
       shortfall(t.tension_N.minCoeff(), goals.least_tension_N, goals.least_tension_N),
       shortfall(-t.tension_N.maxCoeff(), -goals.greatest_tension_N, 2 * goals.greatest_tension_N),
       shortfall(least_clearance_m(clearance(mechanism, pose, object)), goals.clearance_m, goals.clearance_m),
       shortfall(sight, goals.sight_rad, goals.sight_rad + 0.1),
-      shortfall(-sensitivity(mechanism, pose).rotation_each, -goals.rotation_rad_per_m, 3 * goals.rotation_rad_per_m)};
+      shortfall(-rotation, -goals.rotation_rad_per_m, 3 * goals.rotation_rad_per_m)};
   // The worst as well as the mean: a cable that touches is not made good by tensions.
   return 0.5 * *std::max_element(terms.begin(), terms.end()) + 0.1 * std::accumulate(terms.begin(), terms.end(), 0.0);
 }

@@ -14,8 +14,8 @@ namespace lumihull::capture {
 struct DesignGoals {
   double least_tension_N = 2, greatest_tension_N = 120;
   double clearance_m = 0.06;       ///< the least of all that `clearance` measures
-  double sight_rad = 0.03;         ///< between cables and the cone in which the camera sees the object
-  double rotation_rad_per_m = 17;  ///< largest turn of the platform for 1 m of cable error: 17 is 1 degree a mm
+  double sight_rad = 0;            ///< between cables and the cone in which the camera sees the object
+  double rotation_rad_per_m = 12;  ///< Sensitivity::rotation_joint; 12 is 0.7 degrees for 1 mm in all cables together
 };
 
 struct DesignOptions {
