@@ -57,10 +57,12 @@ void design(int seeds, std::size_t evaluations) {
   Job job;
   for (const bool practical : {false, true})
     for (const bool paired : {true, false})
-      for (int seed = 1; seed <= seeds; ++seed) {
+      for (int seed = 21; seed < 21 + seeds; ++seed) {
         DesignOptions options;
         if (!practical) options.goals.reset();
         options.object = object_of(paper_mechanism(), 0.4);
+        // A coarse grid finds as good designs as one of 240 poses, in a third of the time; judged on 2232 below.
+        options.workspaces[0].azimuths = 12, options.workspaces[0].polar_steps = 7;
         options.paired = paired, options.seed = std::uint64_t(seed), options.evaluations = evaluations;
         const double start = cpu_s();
         const MechanismDesign d = design_mechanism(paper_mechanism(), options, job);
@@ -108,13 +110,16 @@ void calibration(int seeds) {
           options.groups = std::min(24, poses / 10);
           options.position_noise_m *= noise, options.rotation_noise_rad *= noise;
           const auto mechanism = test::simulated_mechanism(options);
-          const auto found = calibrate_mechanism(mechanism.guess, test::simulated_observations(mechanism, options, 1));
+          const auto found =
+              calibrate_mechanism(mechanism.guess, test::simulated_observations(mechanism, options, options.seed));
           test::SimulatedOptions clean = options;
           clean.position_noise_m = clean.rotation_noise_rad = 0;
           clean.observations = 480;
-          const double error = test::length_error_m(found, test::simulated_observations(mechanism, clean, 2));
+          const double error =
+              test::length_error_m(found, test::simulated_observations(mechanism, clean, 1000 + options.seed));
           clean.all_over_the_room = true;
-          across += test::length_error_m(found, test::simulated_observations(mechanism, clean, 3)) / seeds;
+          across +=
+              test::length_error_m(found, test::simulated_observations(mechanism, clean, 2000 + options.seed)) / seeds;
           rms += error / seeds, worst = std::max(worst, error);
           for (std::size_t i = 0; i < 6; ++i)
             departures +=

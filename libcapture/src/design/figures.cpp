@@ -22,6 +22,7 @@ constexpr double kDegree = std::numbers::pi / 180;
 constexpr std::array<std::string_view, 6> kCableColors = {"#0072b2", "#d55e00", "#009e73",
                                                           "#cc79a7", "#e69f00", "#56b4e9"};
 constexpr double kFrameX = 78, kFrameY = 92;  // what a figure's frame needs beside the data, px
+constexpr double kPerMetre = 36;              // px
 
 std::string_view cable_color(std::size_t cable) { return kCableColors[cable % kCableColors.size()]; }
 
@@ -33,7 +34,6 @@ void need_indices(const Workspace& workspace, int azimuth, int step) {
 /// One projection; u and v are the world's axes across and up.
 std::string projection(const Mechanism& mechanism, const Workspace& workspace, const KeepOut* object, const Pose& pose,
                        int u, int v, const std::string& title) {
-  constexpr double kPerMetre = 36;
   const Eigen::Vector3d low = mechanism.room.min(), high = mechanism.room.max();
   SvgFigure figure(title, kFrameX + kPerMetre * (high[u] - low[u]), kFrameY + kPerMetre * (high[v] - low[v]));
   static constexpr const char* kLabels[] = {"x, m", "y, m", "z, m"};
@@ -130,9 +130,10 @@ std::string draw_mechanism(const Mechanism& mechanism, const Workspace& workspac
   const std::string above = projection(mechanism, workspace, object, pose, 0, 1, "From above"),
                     front = projection(mechanism, workspace, object, pose, 0, 2, "From the front");
   const Eigen::Vector3d size = mechanism.room.sizes();
-  const double width = kFrameX + 36 * size.x();
-  return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + number("%.0f", 2 * width) + "\" height=\"" +
-         number("%.0f", kFrameY + 36 * std::max(size.y(), size.z())) +
+  const double width = kFrameX + kPerMetre * size.x();
+  const std::string whole =
+      number("%.0f", 2 * width) + " " + number("%.0f", kFrameY + kPerMetre * std::max(size.y(), size.z()));
+  return "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + whole +
          "\"><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>" + above + "<g transform=\"translate(" +
          number("%.0f", width) + " 0)\">" + front + "</g></svg>\n";
 }
@@ -198,7 +199,8 @@ std::string draw_tensions(const WorkspaceReport& report, const Mechanism& mechan
     const double share = (double(i) + 0.5) / double(mechanism.cables.size());
     const double x = (w.first_phi_rad + share * (w.last_phi_rad - w.first_phi_rad)) / kDegree;
     figure.dot(x, 1.02 * most, 4, cable_color(i));
-    figure.text(x, 1.02 * most, "   " + mechanism.cables[i].name, "onmap", "start");
+    figure.text(x + 0.02 * (w.last_phi_rad - w.first_phi_rad) / kDegree, 1.02 * most, mechanism.cables[i].name, "onmap",
+                "start");
   }
   return figure.standalone();
 }
