@@ -1,173 +1,226 @@
-// The mechanism's design and its calibration: what the README of libcapture/src/design reports.
+// The static test and the crossing test of a cable mechanism, beside plain Eigen on the same poses in the same run.
 //
-//   bench_mechanism design SEEDS EVALUATIONS   Φ alone and practical designs beside each other
-//   bench_mechanism tilt SEEDS                 how far the tilt may reach
-//   bench_mechanism calibration SEEDS          lengths at new poses, by noise and kind of data
-//   bench_mechanism figures FOLDER             pictures of paper_mechanism()
+// Peer: W as a fixed 6 x 6 matrix without bounds checks, FullPivLU for rank and solution, torques scaled likewise;
+// where a tension is negative and a verdict alone is asked for, it stops there, as ours does. Crossings: the peer's
+// are 64 steps with a change of sign, each refined by bisection.
+#include <lumihull/capture/clearance.h>
+#include <lumihull/capture/forward.h>
+#include <lumihull/capture/statics.h>
 
-#include <lumihull/base/files.h>
-#include <lumihull/capture/design.h>
-#include <lumihull/capture/mechanism_figures.h>
-
-#include <algorithm>
+#include <Eigen/Dense>
 #include <cstdio>
-#include <cstdlib>
 #include <ctime>
-#include <string>
+#include <unsupported/Eigen/NonLinearOptimization>
+#include <vector>
 
-#include "../capture/simulated_observations.h"
-
-using namespace lumihull;
-using namespace lumihull::capture;
+#include "../capture/mechanism_support.h"
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
+using namespace lumihull;
+using namespace lumihull::capture;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-double cpu_s() { return double(std::clock()) / CLOCKS_PER_SEC; }
+double cpu_seconds() {
+  timespec t;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+}
 
-KeepOut object_of(const Mechanism& m, double radius) { return {{0, 0, m.room.min().z()}, radius, -m.room.min().z()}; }
-
-/// Between the poses that were designed for, too.
-void print_reach(const Mechanism& m, Job& job) {
-  for (const double radius : {1.0, 1.5, 2.0, 2.7}) {
-    Workspace w;
-    w.radius_m = radius, w.azimuths = 72, w.polar_steps = 31;
-    const KeepOut object = object_of(m, 0.4 * std::min(1.0, radius / 1.5));
-    const WorkspaceReport r = examine(m, w, &object, job);
-    double least = 1e9, most = 0, near = 1e9, cables = 1e9, axis = 1e9, sight = 1e9, turn = 0;
-    int balanced = 0, crossings = 0;
-    for (const PoseReport& p : r.poses) {
-      balanced += p.balanced(), crossings += p.crossing.has_value();
-      least = std::min(least, p.balanced() ? p.tensions.tension_N.minCoeff() : 0);
-      most = std::max(most, p.tensions.tension_N.maxCoeff());
-      near = std::min(near, least_clearance_m(p.clearance));
-      cables = std::min(cables, p.clearance.cable_cable), axis = std::min(axis, p.clearance.cable_object);
-      sight = std::min(sight, p.sight_rad), turn = std::max(turn, p.sensitivity.rotation_joint);
-    }
-    std::printf(
-        "  radius %.1f m: %5.1f %% balanced, %5.1f %% with 1 N and 5 cm, %d crossings, %.2f to %.0f N, clearance "
-        "%.1f cm (cables %.1f, object %.1f), sight %.1f deg, %.2f deg/mm\n",
-        radius, 100.0 * balanced / double(w.size()), 100 * r.coverage(1, 0.05), crossings, least, most, 100 * near,
-        100 * cables, 100 * axis, sight / kDegree, turn * 1e-3 / kDegree);
+/// Best of five runs, calls a second.
+template <class F>
+double rate(std::size_t calls, const F& run) {
+  double best = 1e300;
+  for (int k = 0; k < 5; ++k) {
+    const double start = cpu_seconds();
+    run();
+    best = std::min(best, cpu_seconds() - start);
   }
+  return double(calls) / best;
 }
 
-void design(int seeds, std::size_t evaluations) {
-  Job job;
-  for (const bool practical : {false, true})
-    for (const bool paired : {true, false})
-      for (int seed = 21; seed < 21 + seeds; ++seed) {
-        DesignOptions options;
-        if (!practical) options.goals.reset();
-        options.object = object_of(paper_mechanism(), 0.4);
-        // A coarse grid finds as good designs as one of 240 poses, in a third of the time; judged on 2232 below.
-        options.workspaces[0].azimuths = 12, options.workspaces[0].polar_steps = 7;
-        options.paired = paired, options.seed = std::uint64_t(seed), options.evaluations = evaluations;
-        const double start = cpu_s();
-        const MechanismDesign d = design_mechanism(paper_mechanism(), options, job);
-        std::printf("%s, %s, seed %d: objective %.4f after %zu evaluations, %d restarts, %.1f s of CPU\n",
-                    practical ? "practical" : "phi alone", paired ? "three points" : "six points", seed, d.objective,
-                    d.evaluations, d.restarts, cpu_s() - start);
-        print_reach(d.mechanism, job);
-        for (const Cable& c : d.mechanism.cables)
-          std::printf("    {{%.4f, %.4f, %.4f}, {%.4f, %.4f, 0}}\n", c.departure.x(), c.departure.y(), c.departure.z(),
-                      c.attachment.x(), c.attachment.y());
-        std::fflush(stdout);
-      }
+Matrix6 peer_wrench(const Mechanism& m, const Pose& pose, double length) {
+  Matrix6 w;
+  const Eigen::Matrix3d q = pose.rotation.toRotationMatrix();
+  for (int i = 0; i < 6; ++i) {
+    const Eigen::Vector3d c = q * m.cables[std::size_t(i)].attachment;
+    const Eigen::Vector3d u = (m.cables[std::size_t(i)].departure - pose.translation - c).normalized();
+    w.col(i) << u, c.cross(u) / length;
+  }
+  return w;
 }
 
-void tilt(int seeds) {
-  Job job;
-  std::printf("best Φ of %d seeds, 20000 evaluations each, 240 poses, three points; law: tilt from first to last\n",
-              seeds);
-  for (const bool centred : {true, false})
-    for (const int reach : {15, 30, 45, 60, 75, 90}) {
-      double best = 0;
-      for (int seed = 1; seed <= seeds; ++seed) {
-        DesignOptions options;
-        options.goals.reset();
-        options.seed = std::uint64_t(seed);
-        set_tilt(options.workspaces[0], centred ? -reach * kDegree : 0, reach * kDegree);
-        best = std::min(best, design_mechanism(paper_mechanism(), options, job).objective);
-      }
-      Workspace w;
-      set_tilt(w, centred ? -reach * kDegree : 0, reach * kDegree);
-      std::printf("  %4d to %2d degrees: %.0f of 240; paper_mechanism() %d\n", centred ? -reach : 0, reach, -best,
-                  -paper_objective(paper_mechanism(), w));
-      std::fflush(stdout);
-    }
+Vector6 load(const Mechanism& m, const Pose& pose, double length) {
+  const Eigen::Vector3d force(0, 0, m.mass_kg * m.gravity_m_s2);
+  Vector6 f;
+  f << force, (pose.rotation * m.center_of_mass).cross(force) / length;
+  return f;
 }
 
-void calibration(int seeds) {
-  for (const bool room : {false, true})
-    for (const int poses : {60, 240, 600})
-      for (const double noise : {0.0, 1.0}) {
-        double rms = 0, worst = 0, departures = 0, across = 0;
-        for (int seed = 1; seed <= seeds; ++seed) {
-          test::SimulatedOptions options;
-          options.seed = std::uint64_t(seed), options.observations = poses, options.all_over_the_room = room;
-          options.groups = std::min(24, poses / 10);
-          options.position_noise_m *= noise, options.rotation_noise_rad *= noise;
-          const auto mechanism = test::simulated_mechanism(options);
-          const auto found =
-              calibrate_mechanism(mechanism.guess, test::simulated_observations(mechanism, options, options.seed));
-          test::SimulatedOptions clean = options;
-          clean.position_noise_m = clean.rotation_noise_rad = 0;
-          clean.observations = 480;
-          const double error =
-              test::length_error_m(found, test::simulated_observations(mechanism, clean, 1000 + options.seed));
-          clean.all_over_the_room = true;
-          across +=
-              test::length_error_m(found, test::simulated_observations(mechanism, clean, 2000 + options.seed)) / seeds;
-          rms += error / seeds, worst = std::max(worst, error);
-          for (std::size_t i = 0; i < 6; ++i)
-            departures +=
-                (found.mechanism.cables[i].departure - mechanism.truth.cables[i].departure).norm() / (6 * seeds);
-        }
-        std::printf(
-            "%-10s %3d poses, %.1f mm / %.1f mrad: new poses %.4f mm (worst seed %.4f), all over the room "
-            "%.3f mm, departures %.2f mm\n",
-            room ? "room" : "hemisphere", poses, 0.5 * noise, 0.3 * noise, 1e3 * rms, 1e3 * worst, 1e3 * across,
-            1e3 * departures);
-        std::fflush(stdout);
-      }
+Balance verdict(const Mechanism& m, const Vector6& t) {
+  if (!(t.minCoeff() >= -1e-9 * m.mass_kg * m.gravity_m_s2)) return Balance::unbalanced;
+  for (int i = 0; i < 6; ++i)
+    if (t[i] < m.cables[std::size_t(i)].min_tension_N || t[i] > m.cables[std::size_t(i)].max_tension_N)
+      return Balance::loose;
+  return Balance::controlled;
 }
 
-void figures(const std::filesystem::path& folder) {
-  Job job;
-  const Mechanism m = paper_mechanism();
-  const KeepOut object = object_of(m, 0.4);
-  Workspace w;
-  write_file(folder / "room.svg", draw_mechanism(m, w, &object, 0, 6));
-  w.azimuths = 72, w.polar_steps = 31;
-  const WorkspaceReport report = examine(m, w, &object, job);
-  write_file(folder / "balance.svg", draw_map(report, WorkspaceValue::balance));
-  write_file(folder / "least_tension.svg", draw_map(report, WorkspaceValue::least_tension));
-  write_file(folder / "clearance.svg", draw_map(report, WorkspaceValue::clearance));
-  write_file(folder / "sensitivity.svg", draw_map(report, WorkspaceValue::rotation_sensitivity));
-  write_file(folder / "tensions.svg", draw_tensions(report, m, 0));
-  write_file(folder / "tilt.svg", draw_tilt_ranges(m, w, 0, job));
-  Workspace without = w;
-  set_tilt(without, 0, std::numbers::pi / 2);
-  write_file(folder / "balance_without_offset.svg",
-             draw_map(examine(m, without, &object, job), WorkspaceValue::balance));
+template <class Solver>
+Balance peer_test(const Mechanism& m, const Pose& pose, double length) {
+  const Solver lu(peer_wrench(m, pose, length));
+  if constexpr (requires { lu.isInvertible(); })
+    if (!lu.isInvertible()) return Balance::singular;
+  return verdict(m, lu.solve(load(m, pose, length)));
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  const std::string what = argc > 1 ? argv[1] : "";
-  const int seeds = argc > 2 ? std::max(1, std::atoi(argv[2])) : 3;
-  if (what == "design")
-    design(seeds, argc > 3 ? std::size_t(std::atoi(argv[3])) : 20000);
-  else if (what == "tilt")
-    tilt(seeds);
-  else if (what == "calibration")
-    calibration(seeds);
-  else if (what == "figures" && argc > 2)
-    figures(argv[2]);
-  else
-    return std::fputs("usage: bench_mechanism design|tilt|calibration SEEDS, or figures FOLDER\n", stderr), 2;
-  return 0;
+int main() {
+  const Mechanism mechanism = paper_mechanism();
+  const double length = characteristic_length(mechanism);
+  test::Random random(1);
+  std::vector<Pose> poses;
+  for (int i = 0; i < 100000; ++i) {
+    Pose pose = test::pose_on_hemisphere(random.uniform(0, 6.283), random.uniform(0, 1.571), random.uniform(1, 2.5));
+    if (i % 2) pose.rotation = random.rotation(1) * pose.rotation;  // half of them in no order
+    poses.push_back(pose);
+  }
+  const std::size_t n = poses.size();
+  std::vector<Balance> ours(n), full(n), partial(n);
+
+  std::printf("%-46s %12s  %s\n", "static test, six cables, one core", "poses/s", "accuracy");
+  const double own = rate(n, [&] {
+    for (std::size_t i = 0; i < n; ++i) ours[i] = static_test(mechanism, poses[i]);
+  });
+  const double peer_full = rate(n, [&] {
+    for (std::size_t i = 0; i < n; ++i) full[i] = peer_test<Eigen::FullPivLU<Matrix6>>(mechanism, poses[i], length);
+  });
+  const double peer_partial = rate(n, [&] {
+    for (std::size_t i = 0; i < n; ++i)
+      partial[i] = peer_test<Eigen::PartialPivLU<Matrix6>>(mechanism, poses[i], length);
+  });
+  std::size_t counts[4] = {}, other_full = 0, other_partial = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    ++counts[int(ours[i])], other_full += ours[i] != full[i], other_partial += ours[i] != partial[i];
+  std::printf("%-46s %12.0f  controlled %zu, loose %zu, singular %zu, unbalanced %zu\n", "static_test", own, counts[0],
+              counts[1], counts[2], counts[3]);
+  std::printf("%-46s %12.0f  %zu verdicts differ\n", "Eigen FullPivLU", peer_full, other_full);
+  std::printf("%-46s %12.0f  %zu verdicts differ (judges no rank)\n", "Eigen PartialPivLU", peer_partial,
+              other_partial);
+
+  double residual = 0, peer_residual = 0;
+  const double tension_rate = rate(n, [&] {
+    residual = 0;
+    for (const Pose& pose : poses) {
+      const Tensions t = tensions(mechanism, pose);
+      if (t.balance != Balance::unbalanced) residual = std::max(residual, t.residual_N);
+    }
+  });
+  const double svd_rate = rate(n, [&] {
+    peer_residual = 0;
+    for (const Pose& pose : poses) {
+      const Matrix6 w = peer_wrench(mechanism, pose, length);
+      const Eigen::JacobiSVD<Matrix6, Eigen::NoQRPreconditioner> svd(w, Eigen::ComputeFullU | Eigen::ComputeFullV);
+      const Vector6 f = load(mechanism, pose, length), t = svd.solve(f);
+      if (t.minCoeff() >= 0 && svd.singularValues()[5] > 1e-8)
+        peer_residual = std::max(peer_residual, (w * t - f).norm());
+    }
+  });
+  std::printf("%-46s %12.0f  largest residual %.1e N\n", "tensions (with least singular value, NNLS)", tension_rate,
+              residual);
+  std::printf("%-46s %12.0f  largest residual %.1e N\n", "Eigen JacobiSVD (no NNLS where unbalanced)", svd_rate,
+              peer_residual);
+  for (const int cables : {7, 8, 12}) {
+    const Mechanism more = test::random_mechanism(random, cables);
+    const std::size_t some = 5000;
+    std::size_t controlled = 0;
+    const double r = rate(some, [&] {
+      controlled = 0;
+      for (std::size_t i = 0; i < some; ++i) controlled += tensions(more, poses[i]).balance == Balance::controlled;
+    });
+    std::printf("tensions, %2d cables %27s %12.0f  controlled %zu of %zu\n", cables, "", r, controlled, some);
+  }
+
+  // Steps of a scan: neighbours on the hemisphere, 10 degrees apart.
+  std::vector<std::pair<Pose, Pose>> steps;
+  for (int i = 0; i < 100000; ++i) {
+    const double theta = random.uniform(0, 6.283), phi = random.uniform(0, 1.4);
+    steps.push_back({test::pose_on_hemisphere(theta, phi), i % 2 ? test::pose_on_hemisphere(theta, phi + 0.17)
+                                                                 : test::pose_on_hemisphere(theta + 0.17, phi)});
+  }
+  Mechanism crossed = mechanism;  // one that does cross
+  std::swap(crossed.cables[0].departure, crossed.cables[3].departure);
+  for (const auto& [name, m] : {std::pair<const char*, const Mechanism*>{"paper's mechanism", &mechanism},
+                                {"two cables exchanged", &crossed}}) {
+    std::size_t found = 0;
+    const double alone = rate(steps.size(), [&] {
+      found = 0;
+      for (const auto& [from, to] : steps) found += first_crossing(*m, from, to).has_value();
+    });
+    const double both = rate(steps.size(), [&] {
+      found = 0;
+      for (const auto& [from, to] : steps) {
+        if (static_test(*m, to) != Balance::controlled) ++found;
+        found += first_crossing(*m, from, to).has_value();
+      }
+    });
+    std::printf("%-20s first_crossing %10.0f steps/s, %.0f ns a pair; with static_test %10.0f poses/s (%zu)\n", name,
+                alone, 1e9 / alone / 12, both, found);
+  }
+  const double clear = rate(n, [&] {
+    double least = 1;
+    const KeepOut object{{0, 0, -1}, 0.3, 1.2};
+    for (const Pose& pose : poses) least = std::min(least, clearance(mechanism, pose, &object).cable_cable);
+    if (least > 1e9) std::puts("?");
+  });
+  std::printf("clearance with an object: %.0f poses/s\n", clear);
+
+  // Forward kinematics from 0.1 m and 0.1 rad away, beside Eigen's Powell hybrid on the same equations.
+  struct Lengths {
+    const Mechanism* m;
+    Eigen::VectorXd wanted;
+    Pose start;
+    int inputs() const { return 6; }
+    int values() const { return 6; }
+    Pose pose(const Eigen::VectorXd& x) const {
+      const Eigen::Vector3d turn = x.tail<3>();
+      const Eigen::Quaterniond q(Eigen::AngleAxisd(
+          turn.norm(), turn.norm() > 0 ? Eigen::Vector3d(turn.normalized()) : Eigen::Vector3d::UnitX()));
+      return {q * start.rotation, start.translation + x.head<3>()};
+    }
+    int operator()(const Eigen::VectorXd& x, Eigen::VectorXd& f) const {
+      f = cable_lengths(*m, pose(x)) - wanted;
+      return 0;
+    }
+  };
+  const std::size_t starts = 10000;
+  std::vector<Pose> goals, from;
+  for (std::size_t i = 0; i < starts; ++i) {
+    goals.push_back(test::pose_on_hemisphere(random.uniform(0, 6.283), random.uniform(0, 1.571)));
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.1, random.direction()));
+    from.push_back({turn * goals[i].rotation, goals[i].translation + 0.1 * random.direction()});
+  }
+  double worst = 0, peer_worst = 0;
+  const double forward = rate(starts, [&] {
+    worst = 0;
+    for (std::size_t i = 0; i < starts; ++i) {
+      const CableVector l = cable_lengths(mechanism, goals[i]);
+      const Hanging h = hang_rigid(mechanism, {l.data(), std::size_t(l.size())}, from[i]);
+      worst = std::max(worst, (h.world_from_platform.translation - goals[i].translation).norm());
+    }
+  });
+  const double hybrid = rate(starts, [&] {
+    peer_worst = 0;
+    for (std::size_t i = 0; i < starts; ++i) {
+      Lengths f{&mechanism, cable_lengths(mechanism, goals[i]), from[i]};
+      Eigen::HybridNonLinearSolver<Lengths> solver(f);
+      solver.parameters.xtol = 1e-13;
+      Eigen::VectorXd x = Eigen::VectorXd::Zero(6);
+      solver.solveNumericalDiff(x);
+      peer_worst = std::max(peer_worst, (f.pose(x).translation - goals[i].translation).norm());
+    }
+  });
+  std::printf("hang_rigid %.0f/s, worst %.1e m; Eigen's Powell hybrid (no tensions) %.0f/s, worst %.1e m\n", forward,
+              worst, hybrid, peer_worst);
 }
