@@ -2,6 +2,7 @@
 
 #include <lumihull/base/job.h>
 #include <lumihull/capture/clearance.h>
+#include <lumihull/capture/sensitivity.h>
 #include <lumihull/capture/statics.h>
 
 #include <cstddef>
@@ -37,5 +38,57 @@ struct Workspace {
 
 /// f and δ for a tilt that goes evenly from first to last while φ goes from 0 to 90° (eq. 6).
 LUMIHULL_API void set_tilt(Workspace& workspace, double first_tilt_rad, double last_tilt_rad);
+
+/// Error{invalid_argument} naming the first value that is not finite or outside its range.
+LUMIHULL_API void check(const Workspace& workspace);
+
+/// The least of all distances.
+LUMIHULL_API double least_clearance_m(const Clearance& clearance);
+
+/// One pose of a workspace, judged.
+struct PoseReport {
+  Tensions tensions;
+  Clearance clearance;
+  Sensitivity sensitivity;  ///< infinite where not controlled
+  /// Smallest angle at the camera's centre between a cable and the cone in which the object's bounding sphere (its
+  /// keep-out's cap) is seen, rad; negative: a cable is in front of the object. Without an object: to the line of
+  /// sight.
+  double sight_rad = 0;
+  std::optional<Crossing> crossing;  ///< on the way to the next pose
+
+  bool balanced() const { return tensions.balance == Balance::controlled || tensions.balance == Balance::loose; }
+};
+
+struct LUMIHULL_API WorkspaceReport {
+  Workspace workspace;
+  std::vector<PoseReport> poses;  ///< workspace.size(): azimuths in turn, polar steps within each
+
+  const PoseReport& at(int azimuth, int step) const {
+    return poses[std::size_t(azimuth) * std::size_t(workspace.polar_steps) + std::size_t(step)];
+  }
+  /// Φ of the paper's eq. 1: poses with a crossing after them minus balanced poses; the ideal is -workspace.size().
+  int paper_objective() const;
+  /// Share of poses that are balanced with tensions and clearances of at least these, and no crossing after them.
+  double coverage(double least_tension_N, double clearance_m) const;
+};
+
+/// Judges every pose. The way from a pose leads to the next one of the procedure: down along an azimuth; from its end
+/// to the end of the next azimuth, up which the robot goes as it came down (paper, 2.2); from the last azimuth's end
+/// nowhere.
+LUMIHULL_API WorkspaceReport examine(const Mechanism& mechanism, const Workspace& workspace, const KeepOut* object,
+                                     Job& job);
+
+/// Φ alone (paper, eq. 1), much faster. s = 1 where balance is controlled or loose: a pose that is balanced though no
+/// cable resists some motion does not count, or six cables at one point would be ideal.
+LUMIHULL_API int paper_objective(const Mechanism& mechanism, const Workspace& workspace);
+
+/// How far the platform may tilt, without torsion, towards the view's azimuth (positive: top outwards) and away from
+/// it, while every tension stays >= least_tension_N on the way from 0; steps of one degree up to 90°. NaN for both
+/// where tilt 0 is not balanced.
+struct TiltRange {
+  double low_rad = 0, high_rad = 0;
+};
+LUMIHULL_API TiltRange tilt_range(const Mechanism& mechanism, const Workspace& workspace, int azimuth, int step,
+                                  double least_tension_N = 0);
 
 }  // namespace lumihull::capture
