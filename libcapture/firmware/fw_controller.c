@@ -381,7 +381,7 @@ static void watch(fw_controller *c) {
 }
 
 static void move(fw_controller *c, uint32_t elapsed_ms) {
-  if (c->motion.path == FW_REST) return;
+  if (elapsed_ms == 0 || c->motion.path == FW_REST) return;
   while (elapsed_ms-- > 0 && c->motion.path != FW_REST) fw_motion_advance(&c->motion);
   c->hal->step_winches(c->hal->self, c->motion.length_um, c->motion.winches);
 }

@@ -1,0 +1,292 @@
+// Winches and the bearing's solenoid over the serial link.
+#include <lumihull/base/error.h>
+#include <lumihull/capture/mechanism.h>
+#include <lumihull/capture/serial.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "serial_link.h"
+
+namespace lumihull::capture {
+namespace {
+
+using namespace internal;
+using Kind = SerialLink::Answer::Kind;
+
+constexpr double kPoll_s = 0.1;
+constexpr double kMargin_s = 5;  ///< beyond the time that the controller announced
+constexpr int kTries = 3;        ///< of a request that got no reply
+constexpr double kRollEqual_rad = 1e-6;
+
+struct Status {
+  unsigned flags = 0;
+  double to_go_s = 0;  ///< of a move
+  std::vector<std::int32_t> lengths_um;
+  bool has(unsigned bit) const { return flags & bit; }
+};
+
+std::int32_t micrometres(double metres, const std::string& subject) {
+  const double um = metres * 1e6;
+  if (!(std::abs(um) <= 1e8))
+    throw Error(ErrorCode::invalid_argument, "a length must be finite and below 100 m", subject);
+  return std::int32_t(std::llround(um));
+}
+
+class SerialRobot final : public Robot {
+ public:
+  SerialRobot(std::shared_ptr<SerialLink> link, const Mechanism& mechanism, SerialRobotOptions options)
+      : link_(std::move(link)), mechanism_(mechanism), options_(std::move(options)) {
+    check(mechanism_);
+    if (!(options_.solenoid_s > 0 && options_.solenoid_s <= 60))
+      throw Error(ErrorCode::invalid_argument, "must be 0 … 60 s", "SerialRobotOptions::solenoid_s");
+    if (link_->controller().winches != mechanism_.cables.size())
+      throw Error(ErrorCode::invalid_argument,
+                  "the mechanism has " + std::to_string(mechanism_.cables.size()) + " cables, the controller " +
+                      std::to_string(link_->controller().winches) + " winches",
+                  link_->device());
+  }
+  ~SerialRobot() override { make_safe(); }
+
+  State state() override;
+  void move_to(const PlannedStop& stop, Job& job) override;
+  void set_roll(double roll_rad, Job& job) override;
+  void declare_position(const PlannedStop& stop) override;
+  void make_safe() noexcept override;
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const { throw Error(ErrorCode::io, what, link_->device()); }
+  [[noreturn]] void fail_nak(const std::string& what, const SerialLink::Answer& answer) const;
+  SerialLink::Answer ask(Type type, const Bytes& payload, const std::string& what);
+  Status status();
+  std::vector<std::int32_t> lengths_of(const PlannedStop& stop) const;
+  std::vector<Bytes> setpoints(const std::vector<CableSetpoint>& motion, const std::vector<std::int32_t>& to_um) const;
+  std::optional<double> try_begin(const std::vector<Bytes>& setpoints, Type last, const Bytes& payload);
+  double begin(const std::vector<CableSetpoint>& motion, const std::vector<std::int32_t>& to_um);
+  void append_lengths(Bytes& payload, const std::vector<std::int32_t>& lengths_um) const;
+  void wait_for_rest(double patience_s, Job& job);
+
+  std::shared_ptr<SerialLink> link_;
+  Mechanism mechanism_;
+  SerialRobotOptions options_;
+  double roll_rad_ = std::numeric_limits<double>::quiet_NaN();  ///< nobody has said it yet
+};
+
+void SerialRobot::fail_nak(const std::string& what, const SerialLink::Answer& answer) const {
+  std::string why = nak_words(answer.code);
+  if ((answer.code == NakCode::limit || answer.code == NakCode::no_limits) && answer.detail >= 0 &&
+      std::size_t(answer.detail) < mechanism_.cables.size())
+    why += ", cable \"" + mechanism_.cables[std::size_t(answer.detail)].name + "\"";
+  fail(what + ": " + why);
+}
+
+/// For requests that may be carried out twice without harm.
+SerialLink::Answer SerialRobot::ask(Type type, const Bytes& payload, const std::string& what) {
+  for (int i = 0; i < kTries; ++i) {
+    auto answer = link_->request(type, payload);
+    if (answer.kind == Kind::ack) return answer;
+    if (answer.kind == Kind::nak) fail_nak(what, answer);
+  }
+  fail(what + ": the controller does not answer; check its power and the line");
+}
+
+Status SerialRobot::status() {
+  const auto answer = ask(Type::status, {}, "state");
+  PayloadReader in(answer.data);
+  Status status;
+  status.flags = in.u16();
+  status.to_go_s = in.u32() * 1e-3;
+  const unsigned n = in.u8();
+  for (unsigned i = 0; i < n && in.ok(); ++i) status.lengths_um.push_back(in.i32());
+  if (!in.ok() || n != mechanism_.cables.size()) fail("state: the reply is not as in the protocol");
+  return status;
+}
+
+Robot::State SerialRobot::state() {
+  State state;
+  try {
+    const Status now = status();
+    state.moving = now.has(flag::moving);
+    state.position_known = now.has(flag::position_known);
+    if (state.position_known)
+      for (const std::int32_t um : now.lengths_um) state.lengths_m.push_back(um * 1e-6);
+    if (now.has(flag::emergency_stop)) state.fault = "the emergency stop is pressed";
+    state.ready = state.fault.empty();
+  } catch (const Error& e) {
+    state.fault = e.what();
+  }
+  return state;
+}
+
+void SerialRobot::append_lengths(Bytes& payload, const std::vector<std::int32_t>& lengths_um) const {
+  append_u8(payload, std::uint8_t(lengths_um.size()));
+  for (const std::int32_t um : lengths_um) append_u32(payload, std::uint32_t(um));
+}
+
+std::vector<std::int32_t> SerialRobot::lengths_of(const PlannedStop& stop) const {
+  if (stop.lengths_m.size() != mechanism_.cables.size())
+    throw Error(ErrorCode::invalid_argument,
+                "has " + std::to_string(stop.lengths_m.size()) + " cable lengths, the mechanism " +
+                    std::to_string(mechanism_.cables.size()) + " cables",
+                "stop \"" + stop.name + "\"");
+  std::vector<std::int32_t> lengths_um;
+  for (const double m : stop.lengths_m) lengths_um.push_back(micrometres(m, "stop \"" + stop.name + "\""));
+  return lengths_um;
+}
+
+/// The payloads of the SETPOINTs, thinned out to what the controller holds.
+std::vector<Bytes> SerialRobot::setpoints(const std::vector<CableSetpoint>& motion,
+                                          const std::vector<std::int32_t>& to_um) const {
+  const std::size_t count = std::min<std::size_t>({motion.size(), link_->controller().queue, 255});
+  std::vector<Bytes> payloads;
+  std::uint32_t before_ms = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const CableSetpoint& point = motion[(k + 1) * motion.size() / count - 1];
+    if (!(point.time_s > 0 && point.time_s < 1000) || point.lengths_m.size() != to_um.size())
+      throw Error(ErrorCode::invalid_argument, "setpoints need times below 1000 s and a length for each cable",
+                  "motion");
+    const auto at_ms = std::uint32_t(std::llround(point.time_s * 1e3));
+    if (at_ms <= before_ms || at_ms - before_ms > 60000)
+      throw Error(ErrorCode::invalid_argument, "setpoints must be 1 ms … 60 s apart, in order", "motion");
+    std::vector<std::int32_t> lengths_um;
+    for (const double m : point.lengths_m) lengths_um.push_back(micrometres(m, "motion"));
+    Bytes& payload = payloads.emplace_back();
+    append_u8(payload, std::uint8_t(k));
+    append_u16(payload, std::uint16_t(at_ms - before_ms));
+    append_lengths(payload, k + 1 < count ? lengths_um : to_um);
+    before_ms = at_ms;
+  }
+  return payloads;
+}
+
+/// Seconds until it is there; nothing: some reply was lost, and nothing moves.
+std::optional<double> SerialRobot::try_begin(const std::vector<Bytes>& setpoints, Type last, const Bytes& payload) {
+  for (const Bytes& setpoint : setpoints) {
+    const auto answer = link_->request(Type::setpoint, setpoint);
+    if (answer.kind == Kind::nak) fail_nak("setpoint", answer);
+    if (answer.kind != Kind::ack) return std::nullopt;
+  }
+  const auto answer = link_->request(last, payload);
+  if (answer.kind == Kind::nak) fail_nak("move", answer);
+  if (answer.kind == Kind::ack) {
+    PayloadReader in(answer.data);
+    return in.u32() * 1e-3;
+  }
+  // It may have begun all the same. What moves now can only be this.
+  const Status now = status();
+  if (now.has(flag::moving)) return now.to_go_s;
+  return std::nullopt;
+}
+
+double SerialRobot::begin(const std::vector<CableSetpoint>& motion, const std::vector<std::int32_t>& to_um) {
+  const auto queue = setpoints(motion, to_um);
+  Bytes payload;
+  if (queue.empty())
+    append_lengths(payload, to_um);
+  else
+    append_u8(payload, std::uint8_t(queue.size()));
+  for (int i = 0; i < kTries; ++i)
+    if (const auto seconds = try_begin(queue, queue.empty() ? Type::move : Type::start, payload)) return *seconds;
+  fail("move: the controller does not answer; check its power and the line");
+}
+
+void SerialRobot::wait_for_rest(double patience_s, Job& job) {
+  for (double waited_s = 0;; waited_s += kPoll_s) {
+    job.check();
+    if (!status().has(flag::moving)) return;
+    if (waited_s > patience_s) fail("move: takes longer than the controller announced");
+    link_->sleep(kPoll_s);
+  }
+}
+
+void SerialRobot::move_to(const PlannedStop& stop, Job& job) {
+  job.check();
+  const auto to_um = lengths_of(stop);
+  try {
+    const Status before = status();
+    if (!before.has(flag::position_known)) fail("move: " + nak_words(NakCode::position));
+    std::vector<CableSetpoint> motion;
+    if (options_.motion) {
+      std::vector<double> from_m;
+      for (const std::int32_t um : before.lengths_um) from_m.push_back(um * 1e-6);
+      motion = options_.motion(from_m, stop);
+    }
+    wait_for_rest(begin(motion, to_um) + kMargin_s, job);
+    const Status after = status();
+    if (after.has(flag::emergency_stop)) fail("move: " + nak_words(NakCode::stopped));
+    if (!after.has(flag::position_known)) fail("move: the controller restarted on the way; the position is not known");
+    if (after.has(flag::broken_off) || after.lengths_um != to_um)
+      fail(after.has(flag::host_lost) ? "move: broken off, for the controller did not hear this program for 1.5 s"
+                                      : "move: broken off before its end");
+  } catch (...) {
+    make_safe();
+    throw;
+  }
+}
+
+void SerialRobot::set_roll(double roll_rad, Job& job) {
+  job.check();
+  if (std::abs(roll_rad - roll_rad_) <= kRollEqual_rad) return;
+  const double limit_s = link_->controller().max_solenoid_ms * 1e-3;
+  Bytes payload;
+  append_u32(payload, std::uint32_t(std::llround(options_.solenoid_s * 1e3)));
+  try {
+    // Busy: it rests from the turn before, as long as its longest time.
+    for (double waited_s = 0;; waited_s += kPoll_s) {
+      job.check();
+      const auto answer = link_->request(Type::solenoid, payload);
+      if (answer.kind == Kind::ack) break;
+      if (answer.kind != Kind::nak) fail("bearing: the controller does not answer; check its power and the line");
+      if (answer.code != NakCode::busy || waited_s > 2 * limit_s) fail_nak("bearing", answer);
+      link_->sleep(kPoll_s);
+    }
+    roll_rad_ = std::numeric_limits<double>::quiet_NaN();  // somewhere in between
+    for (double waited_s = 0; status().has(flag::solenoid); waited_s += kPoll_s) {
+      job.check();
+      if (waited_s > options_.solenoid_s + kMargin_s) fail("bearing: the solenoid stays on");
+      link_->sleep(kPoll_s);
+    }
+  } catch (...) {
+    make_safe();
+    throw;
+  }
+  roll_rad_ = roll_rad;
+}
+
+void SerialRobot::declare_position(const PlannedStop& stop) {
+  const auto lengths_um = lengths_of(stop);
+  const MotionLimits& limits = mechanism_.limits;
+  for (std::size_t i = 0; i < mechanism_.cables.size(); ++i) {
+    const Cable& cable = mechanism_.cables[i];
+    Bytes payload;
+    append_u8(payload, std::uint8_t(i));
+    for (const double value :
+         {cable.min_length_m, cable.max_length_m, limits.cable_speed_m_s, limits.cable_acceleration_m_s2})
+      append_u32(payload, std::uint32_t(micrometres(value, "cable \"" + cable.name + "\"")));
+    ask(Type::limits, payload, "limits of the mechanism");
+  }
+  Bytes payload;
+  append_lengths(payload, lengths_um);
+  ask(Type::declare, payload, "declare position");
+  roll_rad_ = stop.roll_rad;
+}
+
+void SerialRobot::make_safe() noexcept {
+  try {
+    ask(Type::stop, {stop_what::moves | stop_what::solenoid}, "stop");
+  } catch (...) {
+    // The port is gone: the controller hears no heartbeat and does it by itself.
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Robot> open_serial_robot(std::shared_ptr<SerialLink> link, const Mechanism& mechanism,
+                                         const SerialRobotOptions& options) {
+  return std::make_unique<SerialRobot>(std::move(link), mechanism, options);
+}
+
+}  // namespace lumihull::capture
