@@ -1,0 +1,287 @@
+// Winches and the bearing over the serial link, against the firmware's simulator.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <lumihull/base/error.h>
+#include <lumihull/capture/serial.h>
+
+#include <chrono>
+#include <cmath>
+#include <sstream>
+#include <thread>
+
+#include "serial_simulator.h"
+
+namespace lumihull::test {
+namespace {
+
+using namespace capture;
+using testing::HasSubstr;
+
+constexpr double kSpeed = 20;
+
+/// Six cables; where they run does not matter here.
+Mechanism six_cables() {
+  Mechanism mechanism;
+  mechanism.name = "test";
+  for (int i = 0; i < 6; ++i) {
+    Cable cable;
+    cable.name = "cable " + std::to_string(i);
+    cable.departure = {5 * std::cos(i * M_PI / 3), 5 * std::sin(i * M_PI / 3), 6};
+    cable.attachment = {0.2 * std::cos(i * M_PI / 3), 0.2 * std::sin(i * M_PI / 3), 0};
+    cable.max_length_m = 12;
+    mechanism.cables.push_back(cable);
+  }
+  mechanism.room = {Eigen::Vector3d(-5, -6, 0), Eigen::Vector3d(5, 6, 6)};
+  return mechanism;
+}
+
+PlannedStop stop_at(const std::string& name, std::vector<double> lengths_m, double roll_rad = 0) {
+  PlannedStop stop;
+  stop.name = name;
+  stop.lengths_m = std::move(lengths_m);
+  stop.roll_rad = roll_rad;
+  return stop;
+}
+
+const PlannedStop kHome = stop_at("home", {5, 5, 5, 5, 5, 5});
+const PlannedStop kAway = stop_at("away", {5.4, 5.3, 5.2, 4.9, 4.8, 4.7});
+
+struct Rig {
+  explicit Rig(std::vector<std::string> faults = {}, const SerialRobotOptions& options = {})
+      : simulator([&] {
+          faults.insert(faults.end(), {"--speed", "20"});
+          return faults;
+        }()) {
+    SerialOptions serial;
+    serial.device = simulator.device();
+    serial.time_scale = kSpeed;
+    for (int i = 0; !robot; ++i) try {
+        link = open_serial_link(serial);
+        robot = open_serial_robot(link, six_cables(), options);
+      } catch (const Error& e) {
+        if (i > 20 || e.code() != ErrorCode::io) throw;
+      }
+  }
+  SerialSimulator simulator;
+  std::shared_ptr<SerialLink> link;
+  std::unique_ptr<Robot> robot;
+  Job job;
+};
+
+template <class Call>
+std::string error_of(Call call, ErrorCode code = ErrorCode::io) {
+  try {
+    call();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), code) << e.what();
+    return e.what();
+  }
+  ADD_FAILURE() << "no error";
+  return {};
+}
+
+/// Where the simulator's winches came to rest last.
+std::vector<double> true_lengths(const SerialSimulator& simulator) {
+  std::vector<double> lengths;
+  for (const auto& event : simulator.log())
+    if (event.what.rfind("rests", 0) == 0) {
+      lengths.clear();
+      std::istringstream in(event.what.substr(5));
+      for (double um; in >> um;) lengths.push_back(um * 1e-6);
+    }
+  return lengths;
+}
+
+bool ever_moved(const SerialSimulator& simulator) {
+  for (const auto& event : simulator.log())
+    if (event.what.rfind("moves", 0) == 0) return true;
+  return false;
+}
+
+TEST(SerialRobot, GoesWhereItIsToldOnceThePositionIsDeclared) {
+  Rig rig;
+  auto state = rig.robot->state();
+  EXPECT_TRUE(state.ready);
+  EXPECT_FALSE(state.position_known);
+  EXPECT_TRUE(state.lengths_m.empty());
+  EXPECT_THAT(error_of([&] { rig.robot->move_to(kAway, rig.job); }), HasSubstr("not known"));
+  EXPECT_FALSE(ever_moved(rig.simulator));
+
+  rig.robot->declare_position(kHome);
+  EXPECT_EQ(rig.robot->state().lengths_m, kHome.lengths_m);
+  rig.robot->move_to(kAway, rig.job);
+  state = rig.robot->state();
+  EXPECT_FALSE(state.moving);
+  ASSERT_EQ(state.lengths_m.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_NEAR(state.lengths_m[i], kAway.lengths_m[i], 1e-9);
+    EXPECT_NEAR(true_lengths(rig.simulator).at(i), kAway.lengths_m[i], 1e-9);
+  }
+}
+
+TEST(SerialRobot, LimitsAreRefusedByTheController) {
+  Rig rig;
+  rig.robot->declare_position(kHome);
+  EXPECT_THAT(error_of([&] {
+                rig.robot->move_to(stop_at("far", {5, 5, 12.1, 5, 5, 5}), rig.job);
+              }),
+              HasSubstr("cable 2"));
+  error_of([&] { rig.robot->move_to(stop_at("none", {}), rig.job); }, ErrorCode::invalid_argument);
+  error_of([&] { rig.robot->move_to(stop_at("nan", {5, 5, NAN, 5, 5, 5}), rig.job); }, ErrorCode::invalid_argument);
+  EXPECT_FALSE(ever_moved(rig.simulator));
+
+  // Faster than the controller was built for.
+  Mechanism mechanism = six_cables();
+  mechanism.limits.cable_speed_m_s = 0.9;
+  EXPECT_THAT(error_of([&] { open_serial_robot(rig.link, mechanism)->declare_position(kHome); }), HasSubstr("limit"));
+  mechanism.cables.pop_back();
+  error_of([&] { open_serial_robot(rig.link, mechanism); }, ErrorCode::invalid_argument);
+}
+
+TEST(SerialRobot, FollowsAMotionOfManySetpoints) {
+  std::vector<double> asked_from;
+  SerialRobotOptions options;
+  // 200 setpoints, more than the controller holds: a smooth start and end in 4 s.
+  options.motion = [&](const std::vector<double>& from, const PlannedStop& to) {
+    asked_from = from;
+    std::vector<CableSetpoint> motion;
+    for (int k = 1; k <= 200; ++k) {
+      CableSetpoint point{k * 0.02, {}};
+      const double s = k / 200.0, way = s * s * s * (10 - 15 * s + 6 * s * s);
+      for (std::size_t i = 0; i < from.size(); ++i)
+        point.lengths_m.push_back(from[i] + way * (to.lengths_m[i] - from[i]));
+      motion.push_back(point);
+    }
+    return motion;
+  };
+  Rig rig({}, options);
+  rig.robot->declare_position(kHome);
+  rig.robot->move_to(kAway, rig.job);
+  EXPECT_EQ(asked_from, kHome.lengths_m);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(true_lengths(rig.simulator).at(i), kAway.lengths_m[i], 1e-9);
+  const auto log = rig.simulator.log();
+  const auto begin = rig.simulator.await("moves"), end = rig.simulator.await("rests");
+  EXPECT_NEAR(double(log[end].ms - log[begin].ms), 4000, 1);
+
+  // The same way in a tenth of the time is beyond the limits, and nothing moves.
+  Rig hasty({}, {.motion = [&](const auto& from, const auto& to) {
+              auto motion = options.motion(from, to);
+              for (auto& point : motion) point.time_s /= 10;
+              return motion;
+            }});
+  hasty.robot->declare_position(kHome);
+  EXPECT_THAT(error_of([&] { hasty.robot->move_to(kAway, hasty.job); }), HasSubstr("limit"));
+  EXPECT_FALSE(ever_moved(hasty.simulator));
+}
+
+TEST(SerialRobot, OverABadLineItGoesOrSaysThatItDidNot) {
+  Rig rig({"--drop", "0.05", "--damage", "0.05", "--duplicate", "0.05", "--delay", "0.05", "--seed", "5"});
+  int arrived = 0;
+  for (int i = 0; i < 30; ++i) {
+    const PlannedStop& to = i % 2 ? kHome : kAway;
+    try {
+      if (!rig.robot->state().position_known) rig.robot->declare_position(i % 2 ? kAway : kHome);
+      rig.robot->move_to(to, rig.job);
+      for (std::size_t k = 0; k < 6; ++k) EXPECT_NEAR(true_lengths(rig.simulator).at(k), to.lengths_m[k], 1e-9);
+      ++arrived;
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ErrorCode::io) << e.what();
+    }
+  }
+  EXPECT_GE(arrived, 15);
+}
+
+TEST(SerialRobot, AfterARestartNothingMovesUntilThePositionIsDeclared) {
+  Rig rig;
+  rig.robot->declare_position(kHome);
+  std::thread power([&] {
+    rig.simulator.await("moves");
+    rig.simulator.order("reset");
+  });
+  error_of([&] { rig.robot->move_to(kAway, rig.job); });
+  power.join();
+  rig.simulator.await("boot 2");
+  EXPECT_FALSE(rig.robot->state().position_known);
+  const auto events = rig.simulator.log().size();
+  EXPECT_THAT(error_of([&] { rig.robot->move_to(kAway, rig.job); }), HasSubstr("not known"));
+  const auto later = rig.simulator.log();
+  for (std::size_t i = events; i < later.size(); ++i) EXPECT_THAT(later[i].what, testing::Not(HasSubstr("moves")));
+  rig.robot->declare_position(kHome);
+  rig.robot->move_to(kAway, rig.job);
+  EXPECT_NEAR(true_lengths(rig.simulator).at(0), kAway.lengths_m[0], 1e-9);
+}
+
+TEST(SerialRobot, CancellingStopsTheWinches) {
+  Rig rig;
+  rig.robot->declare_position(kHome);
+  std::thread operator_thread([&] {
+    rig.simulator.await("moves");
+    rig.job.cancel();
+  });
+  error_of([&] { rig.robot->move_to(kAway, rig.job); }, ErrorCode::cancelled);
+  operator_thread.join();
+  rig.simulator.await("rests");
+  const auto at = true_lengths(rig.simulator);
+  EXPECT_LT(at.at(0), kAway.lengths_m[0]);
+  const auto state = rig.robot->state();
+  EXPECT_TRUE(state.position_known);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(state.lengths_m.at(i), at[i], 1e-9);
+}
+
+TEST(SerialRobot, TheEmergencyStopIsAFault) {
+  Rig rig;
+  rig.robot->declare_position(kHome);
+  std::thread operator_thread([&] {
+    rig.simulator.await("moves");
+    rig.simulator.order("stop on");
+  });
+  EXPECT_THAT(error_of([&] { rig.robot->move_to(kAway, rig.job); }), HasSubstr("emergency stop"));
+  operator_thread.join();
+  auto state = rig.robot->state();
+  EXPECT_FALSE(state.ready);
+  EXPECT_FALSE(state.position_known);
+  EXPECT_THAT(state.fault, HasSubstr("emergency stop"));
+  rig.simulator.order("stop off");
+  rig.simulator.await("stop off");
+  for (int i = 0; i < 100 && !rig.robot->state().ready; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_TRUE(rig.robot->state().ready);
+  EXPECT_FALSE(rig.robot->state().position_known);
+}
+
+TEST(SerialRobot, TheBearingIsReleasedOnlyForAnotherAngle) {
+  Rig rig;
+  rig.robot->declare_position(kHome);  // at roll 0
+  auto times = [&] {
+    std::vector<std::uint64_t> on, off;
+    for (const auto& event : rig.simulator.log()) {
+      if (event.what == "solenoid on") on.push_back(event.ms);
+      if (event.what == "solenoid off" && on.size() > off.size()) off.push_back(event.ms);
+    }
+    for (std::size_t i = 0; i < off.size(); ++i) off[i] -= on[i];
+    return off;
+  };
+  rig.robot->set_roll(0, rig.job);
+  EXPECT_TRUE(times().empty());
+  rig.robot->set_roll(M_PI / 2, rig.job);
+  rig.robot->set_roll(M_PI / 2, rig.job);
+  EXPECT_EQ(times(), (std::vector<std::uint64_t>{1500}));
+  rig.robot->set_roll(0, rig.job);  // waits until the coil has rested
+  EXPECT_EQ(times(), (std::vector<std::uint64_t>{1500, 1500}));
+
+  Rig hot({}, {.motion = {}, .solenoid_s = 2.5});
+  hot.robot->declare_position(kHome);
+  EXPECT_THAT(error_of([&] { hot.robot->set_roll(1, hot.job); }), HasSubstr("limit"));
+}
+
+TEST(SerialRobot, APortThatIsPulledOutIsAFault) {
+  Rig rig;
+  rig.simulator.kill();
+  const auto state = rig.robot->state();
+  EXPECT_FALSE(state.ready);
+  EXPECT_THAT(state.fault, HasSubstr("plug the controller in again"));
+  error_of([&] { rig.robot->move_to(kAway, rig.job); });
+  rig.robot->make_safe();
+}
+
+}  // namespace
+}  // namespace lumihull::test
