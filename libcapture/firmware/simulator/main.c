@@ -7,10 +7,10 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/select.h>
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
@@ -199,14 +199,18 @@ static void note_moves(simulator *sim) {
   note(sim, event);
 }
 
-static void one_millisecond(simulator *sim) {
-  ++sim->now_ms;
-  if (sim->reboot_at_ms && sim->now_ms >= sim->reboot_at_ms) fail(sim);
-  if (sim->boot_at_ms && sim->now_ms >= sim->boot_at_ms) boot(sim);
+static void hear(simulator *sim) {
   deliver(sim);
   if (sim->running) fw_controller_poll(&sim->controller);
   note_moves(sim);
   deliver(sim);
+}
+
+static void one_millisecond(simulator *sim) {
+  ++sim->now_ms;
+  if (sim->reboot_at_ms && sim->now_ms >= sim->reboot_at_ms) fail(sim);
+  if (sim->boot_at_ms && sim->now_ms >= sim->boot_at_ms) boot(sim);
+  hear(sim);
 }
 
 /* ---- start ---- */
@@ -255,23 +259,37 @@ static void configure(simulator *sim, uint8_t winches) {
   sim->hal.emergency_stop = hal_stopped;
 }
 
+/* Waits until a byte or an order comes, a millisecond of the simulator's at most. */
+static void wait_for_input(const simulator *sim, bool *bytes, bool *orders) {
+  const struct timespec nap = {0, sim->speed > 1 ? (long)(1e6 / sim->speed) : 1000000};
+  fd_set waiting;
+  int n;
+  FD_ZERO(&waiting);
+  FD_SET(sim->terminal, &waiting);
+  FD_SET(STDIN_FILENO, &waiting);
+  n = pselect(sim->terminal + 1, &waiting, NULL, NULL, &nap, NULL);
+  *bytes = n > 0 && FD_ISSET(sim->terminal, &waiting);
+  *orders = n > 0 && FD_ISSET(STDIN_FILENO, &waiting);
+}
+
 static void run(simulator *sim) {
   struct timespec before, now;
-  const struct timespec nap = {0, sim->speed > 1 ? (long)(1e6 / sim->speed) : 1000000};
   double due_ms = 0;
+  bool bytes, orders;
   clock_gettime(CLOCK_MONOTONIC, &before);
   boot(sim);
   for (;;) {
-    struct pollfd waiting[2] = {{sim->terminal, POLLIN, 0}, {STDIN_FILENO, POLLIN, 0}};
-    poll(waiting, 2, 0);
-    if (!(waiting[0].revents | waiting[1].revents)) nanosleep(&nap, NULL);
-    if (waiting[1].revents && !read_orders(sim)) return;
-    if (waiting[0].revents & POLLIN) read_line(sim);
+    wait_for_input(sim, &bytes, &orders);
+    if (orders && !read_orders(sim)) return;
     clock_gettime(CLOCK_MONOTONIC, &now);
     due_ms += sim->speed * ((double)(now.tv_sec - before.tv_sec) * 1e3 + (double)(now.tv_nsec - before.tv_nsec) * 1e-6);
     before = now;
     if (due_ms > LONGEST_STEP_MS) due_ms = LONGEST_STEP_MS;
     for (; due_ms >= 1; due_ms -= 1) one_millisecond(sim);
+    if (bytes) {
+      read_line(sim);
+      hear(sim);
+    }
     write_line(sim);
   }
 }
