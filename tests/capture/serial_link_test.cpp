@@ -223,7 +223,7 @@ TEST(SerialLink, APortThatIsPulledOutIsAnErrorThatNamesIt) {
       ErrorCode::io);
   EXPECT_THAT(text, HasSubstr(simulator.device()));
   EXPECT_THAT(text, HasSubstr("plug the controller in again"));
-  camera->make_safe();  // says nothing
+  camera->make_safe();                                     // says nothing
   EXPECT_EQ(camera->recall(1).state, ShotState::unknown);  // it may have been fired
   error_of([&] { camera->recall(99); }, ErrorCode::io);
 }

@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <lumihull/base/error.h>
+#include <lumihull/capture/motion.h>
 #include <lumihull/capture/serial.h>
+#include <lumihull/capture/statics.h>
 
 #include <chrono>
 #include <cmath>
@@ -47,7 +49,8 @@ const PlannedStop kHome = stop_at("home", {5, 5, 5, 5, 5, 5});
 const PlannedStop kAway = stop_at("away", {5.4, 5.3, 5.2, 4.9, 4.8, 4.7});
 
 struct Rig {
-  explicit Rig(std::vector<std::string> faults = {}, const SerialRobotOptions& options = {})
+  explicit Rig(std::vector<std::string> faults = {}, const SerialRobotOptions& options = {.straight = false},
+               const Mechanism& mechanism = six_cables())
       : simulator([&] {
           faults.insert(faults.end(), {"--speed", "20"});
           return faults;
@@ -57,7 +60,7 @@ struct Rig {
     serial.time_scale = kSpeed;
     for (int i = 0; !robot; ++i) try {
         link = open_serial_link(serial);
-        robot = open_serial_robot(link, six_cables(), options);
+        robot = open_serial_robot(link, mechanism, options);
       } catch (const Error& e) {
         if (i > 20 || e.code() != ErrorCode::io) throw;
       }
@@ -133,45 +136,81 @@ TEST(SerialRobot, LimitsAreRefusedByTheController) {
   // Faster than the controller was built for.
   Mechanism mechanism = six_cables();
   mechanism.limits.cable_speed_m_s = 0.9;
-  EXPECT_THAT(error_of([&] { open_serial_robot(rig.link, mechanism)->declare_position(kHome); }), HasSubstr("limit"));
+  EXPECT_THAT(error_of([&] { open_serial_robot(rig.link, mechanism, {.straight = false})->declare_position(kHome); }),
+              HasSubstr("limit"));
   mechanism.cables.pop_back();
   error_of([&] { open_serial_robot(rig.link, mechanism); }, ErrorCode::invalid_argument);
 }
 
-TEST(SerialRobot, FollowsAMotionOfManySetpoints) {
-  std::vector<double> asked_from;
-  SerialRobotOptions options;
-  // 200 setpoints, more than the controller holds: a smooth start and end in 4 s.
-  options.motion = [&](const std::vector<double>& from, const PlannedStop& to) {
-    asked_from = from;
-    std::vector<CableSetpoint> motion;
-    for (int k = 1; k <= 200; ++k) {
-      CableSetpoint point{k * 0.02, {}};
-      const double s = k / 200.0, way = s * s * s * (10 - 15 * s + 6 * s * s);
-      for (std::size_t i = 0; i < from.size(); ++i)
-        point.lengths_m.push_back(from[i] + way * (to.lengths_m[i] - from[i]));
-      motion.push_back(point);
-    }
-    return motion;
-  };
-  Rig rig({}, options);
-  rig.robot->declare_position(kHome);
-  rig.robot->move_to(kAway, rig.job);
-  EXPECT_EQ(asked_from, kHome.lengths_m);
-  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(true_lengths(rig.simulator).at(i), kAway.lengths_m[i], 1e-9);
-  const auto log = rig.simulator.log();
-  const auto begin = rig.simulator.await("moves"), end = rig.simulator.await("rests");
-  EXPECT_NEAR(double(log[end].ms - log[begin].ms), 4000, 1);
+/// A stop of a real mechanism.
+PlannedStop stop_at(const Mechanism& mechanism, const std::string& name, const Eigen::Vector3d& position,
+                    double turn_rad) {
+  PlannedStop stop;
+  stop.name = name;
+  stop.world_from_platform =
+      Pose(Eigen::Quaterniond(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d(1, 2, 0).normalized())), position);
+  const CableVector lengths = cable_lengths(mechanism, stop.world_from_platform);
+  stop.lengths_m.assign(lengths.data(), lengths.data() + lengths.size());
+  return stop;
+}
 
-  // The same way in a tenth of the time is beyond the limits, and nothing moves.
-  Rig hasty({}, {.motion = [&](const auto& from, const auto& to) {
-              auto motion = options.motion(from, to);
-              for (auto& point : motion) point.time_s /= 10;
-              return motion;
-            }});
-  hasty.robot->declare_position(kHome);
-  EXPECT_THAT(error_of([&] { hasty.robot->move_to(kAway, hasty.job); }), HasSubstr("limit"));
-  EXPECT_FALSE(ever_moved(hasty.simulator));
+TEST(SerialRobot, ThePlatformGoesAlongThePlannedLine) {
+  const Mechanism mechanism = paper_mechanism();
+  const PlannedStop a = stop_at(mechanism, "a", {0.2, -0.5, 1.5}, 0),
+                    b = stop_at(mechanism, "b", {-0.6, 0.7, 2.0}, 0.3);
+  Rig rig({}, {.straight = true}, mechanism);
+  rig.robot->declare_position(a);
+  rig.robot->move_to(b, rig.job);
+  const Move move = plan_move(mechanism, a.world_from_platform, b.world_from_platform);
+  double start_ms = 0, end_ms = 0, largest_m = 0;
+  int samples = 0;
+  for (const auto& event : rig.simulator.log()) {
+    if (event.what.rfind("moves", 0) == 0) start_ms = double(event.ms);
+    if (event.what.rfind("rests", 0) == 0) end_ms = double(event.ms);
+    if (event.what.rfind("at ", 0) != 0) continue;
+    const CableVector planned = cable_lengths(mechanism, pose_at(move, (double(event.ms) - start_ms) * 1e-3));
+    std::istringstream in(event.what.substr(3));
+    for (double um, i = 0; in >> um; ++i)
+      largest_m = std::max(largest_m, std::abs(um * 1e-6 - planned[Eigen::Index(i)]));
+    ++samples;
+  }
+  EXPECT_NEAR(end_ms - start_ms, move.duration_s() * 1e3, 2);
+  EXPECT_GT(samples, 50);
+  EXPECT_LT(largest_m, 0.0005);
+  std::printf("    largest deviation %.3f mm in %.1f s\n", largest_m * 1e3, move.duration_s());
+
+  // Broken off on the way, it goes on from where it hangs.
+  std::thread operator_thread([&] {
+    rig.simulator.await("moves", rig.simulator.await("rests"));
+    rig.job.cancel();
+  });
+  error_of([&] { rig.robot->move_to(a, rig.job); }, ErrorCode::cancelled);
+  operator_thread.join();
+  while (rig.robot->state().moving) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  Job job;
+  rig.robot->move_to(a, job);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(rig.robot->state().lengths_m.at(i), a.lengths_m[i], 1e-6);
+
+  PlannedStop wrong = b;
+  wrong.lengths_m[2] += 2e-6;
+  EXPECT_THAT(error_of([&] { rig.robot->move_to(wrong, job); }, ErrorCode::invalid_argument), HasSubstr("pose"));
+}
+
+TEST(SerialRobot, WhatTheControllerFindsTooFastTakesMoreTime) {
+  // A controller in doubt about its winches; the mechanism's own limits would allow what the platform does.
+  Mechanism mechanism = paper_mechanism();
+  mechanism.limits = {2, 3, 1000, 0.8,
+                      0.6};  // next to no limit of jerk: the cubic overshoots the winches' acceleration
+  const PlannedStop a = stop_at(mechanism, "a", {0.2, -0.5, 1.5}, 0),
+                    b = stop_at(mechanism, "b", {-0.6, 0.7, 2.0}, 0.3);
+  Rig rig({}, {.straight = true}, mechanism);
+  rig.robot->declare_position(a);
+  rig.robot->move_to(b, rig.job);
+  const auto log = rig.simulator.log();
+  const double took_s = double(log[rig.simulator.await("rests")].ms - log[rig.simulator.await("moves")].ms) * 1e-3;
+  const double planned_s = plan_move(mechanism, a.world_from_platform, b.world_from_platform).duration_s();
+  EXPECT_GT(took_s, 1.05 * planned_s);
+  EXPECT_LT(took_s, 2.05 * planned_s);
 }
 
 TEST(SerialRobot, OverABadLineItGoesOrSaysThatItDidNot) {
@@ -268,7 +307,7 @@ TEST(SerialRobot, TheBearingIsReleasedOnlyForAnotherAngle) {
   rig.robot->set_roll(0, rig.job);  // waits until the coil has rested
   EXPECT_EQ(times(), (std::vector<std::uint64_t>{1500, 1500}));
 
-  Rig hot({}, {.motion = {}, .solenoid_s = 2.5});
+  Rig hot({}, {.straight = false, .solenoid_s = 2.5});
   hot.robot->declare_position(kHome);
   EXPECT_THAT(error_of([&] { hot.robot->set_roll(1, hot.job); }), HasSubstr("limit"));
 }

@@ -32,6 +32,7 @@ typedef struct {
 
   uint64_t now_ms;
   uint64_t reboot_at_ms, boot_at_ms; /* 0: not planned */
+  uint64_t moves_at_ms, noted_at_ms;
   bool running, deaf, stopped, moving;
   uint32_t boots;
   sim_channel in, out;
@@ -186,17 +187,25 @@ static void write_line(simulator *sim) {
   memmove(sim->outbox, sim->outbox + n, sim->outbox_count);
 }
 
-static void note_moves(simulator *sim) {
-  const bool moving = sim->running && sim->controller.motion.path != FW_REST;
+static void note_lengths(simulator *sim, const char *what) {
   char event[256];
-  size_t n;
+  size_t n = (size_t)snprintf(event, sizeof event, "%s", what);
   uint8_t i;
-  if (moving == sim->moving) return;
-  sim->moving = moving;
-  n = (size_t)snprintf(event, sizeof event, moving ? "moves" : "rests");
   for (i = 0; i < sim->config.winches; ++i)
     n += (size_t)snprintf(event + n, sizeof event - n, " %ld", (long)sim->length_um[i]);
   note(sim, event);
+}
+
+static void note_moves(simulator *sim) {
+  const bool moving = sim->running && sim->controller.motion.path != FW_REST;
+  if (moving != sim->moving) {
+    sim->moving = moving;
+    sim->moves_at_ms = sim->now_ms;
+    note_lengths(sim, moving ? "moves" : "rests");
+  } else if (moving && (sim->now_ms - sim->moves_at_ms) % 25 == 0 && sim->now_ms != sim->noted_at_ms) {
+    sim->noted_at_ms = sim->now_ms;
+    note_lengths(sim, "at");
+  }
 }
 
 static void hear(simulator *sim) {

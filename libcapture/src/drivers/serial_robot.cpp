@@ -1,9 +1,11 @@
 // Winches and the bearing's solenoid over the serial link.
 #include <lumihull/base/error.h>
-#include <lumihull/capture/mechanism.h>
+#include <lumihull/capture/forward.h>
+#include <lumihull/capture/motion.h>
 #include <lumihull/capture/serial.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -18,8 +20,11 @@ using namespace internal;
 using Kind = SerialLink::Answer::Kind;
 
 constexpr double kPoll_s = 0.1;
-constexpr double kMargin_s = 5;  ///< beyond the time that the controller announced
-constexpr int kTries = 3;        ///< of a request that got no reply
+constexpr double kMargin_s = 5;        ///< beyond the time that the controller announced
+constexpr int kTries = 3;              ///< of a request that got no reply
+constexpr double kPoseEqual_m = 1e-6;  ///< of lengths, as check(Plan)
+constexpr std::uint32_t kSetpoint_ms = 50;
+constexpr std::array<double, 4> kSlower{1, 1.1, 1.4, 2};
 constexpr double kRollEqual_rad = 1e-6;
 
 struct Status {
@@ -63,15 +68,20 @@ class SerialRobot final : public Robot {
   SerialLink::Answer ask(Type type, const Bytes& payload, const std::string& what);
   Status status();
   std::vector<std::int32_t> lengths_of(const PlannedStop& stop) const;
-  std::vector<Bytes> setpoints(const std::vector<CableSetpoint>& motion, const std::vector<std::int32_t>& to_um) const;
-  std::optional<double> try_begin(const std::vector<Bytes>& setpoints, Type last, const Bytes& payload);
-  double begin(const std::vector<CableSetpoint>& motion, const std::vector<std::int32_t>& to_um);
+  Pose pose_of(const std::vector<std::int32_t>& lengths_um, const PlannedStop& to) const;
+  std::vector<Bytes> setpoints(Move move, double factor, const std::vector<std::int32_t>& to_um) const;
+  std::optional<double> try_begin(const std::vector<Bytes>& setpoints, Type last, const Bytes& payload,
+                                  SerialLink::Answer& answer);
+  std::optional<double> begin(const std::vector<Bytes>& setpoints, const std::vector<std::int32_t>& to_um);
+  double begin(const Status& now, const PlannedStop& stop, const std::vector<std::int32_t>& to_um);
   void append_lengths(Bytes& payload, const std::vector<std::int32_t>& lengths_um) const;
   void wait_for_rest(double patience_s, Job& job);
 
   std::shared_ptr<SerialLink> link_;
   Mechanism mechanism_;
   SerialRobotOptions options_;
+  std::optional<Pose> at_;                                      ///< the last stop that was reached or declared
+  std::vector<std::int32_t> at_um_;                             ///< and its lengths
   double roll_rad_ = std::numeric_limits<double>::quiet_NaN();  ///< nobody has said it yet
 };
 
@@ -134,63 +144,102 @@ std::vector<std::int32_t> SerialRobot::lengths_of(const PlannedStop& stop) const
                 "stop \"" + stop.name + "\"");
   std::vector<std::int32_t> lengths_um;
   for (const double m : stop.lengths_m) lengths_um.push_back(micrometres(m, "stop \"" + stop.name + "\""));
+  if (options_.straight) {
+    const CableVector of_pose = cable_lengths(mechanism_, stop.world_from_platform);
+    for (std::size_t i = 0; i < stop.lengths_m.size(); ++i)
+      if (!(std::abs(of_pose[Eigen::Index(i)] - stop.lengths_m[i]) <= kPoseEqual_m))
+        throw Error(ErrorCode::invalid_argument,
+                    "the length of cable \"" + mechanism_.cables[i].name + "\" is not that of its pose",
+                    "stop \"" + stop.name + "\"");
+  }
   return lengths_um;
 }
 
-/// The payloads of the SETPOINTs, thinned out to what the controller holds.
-std::vector<Bytes> SerialRobot::setpoints(const std::vector<CableSetpoint>& motion,
-                                          const std::vector<std::int32_t>& to_um) const {
-  const std::size_t count = std::min<std::size_t>({motion.size(), link_->controller().queue, 255});
+/// Where the platform is, with these lengths.
+Pose SerialRobot::pose_of(const std::vector<std::int32_t>& lengths_um, const PlannedStop& to) const {
+  if (at_ && lengths_um == at_um_) return *at_;
+  std::vector<double> lengths_m;
+  for (const std::int32_t um : lengths_um) lengths_m.push_back(um * 1e-6);
+  try {
+    return hang_rigid(mechanism_, lengths_m, at_.value_or(to.world_from_platform)).world_from_platform;
+  } catch (const Error& e) {
+    fail(std::string("move: its lengths do not tell where the platform is; declare the position (") + e.message() +
+         ")");
+  }
+}
+
+/// The payloads of the SETPOINTs of a straight move in `factor` times its time; none where there is nothing to do in
+/// it.
+std::vector<Bytes> SerialRobot::setpoints(Move move, double factor, const std::vector<std::int32_t>& to_um) const {
+  move.profile = move.profile.slower(factor);
+  const auto duration_ms = std::uint32_t(std::ceil(move.duration_s() * 1e3));
+  const std::uint32_t most = std::min<std::uint32_t>(link_->controller().queue, 255);
+  // Times are whole milliseconds, and lengths those of just these times: else rounding would look like acceleration.
+  const std::uint32_t count = std::min(duration_ms / kSetpoint_ms + 1, most);
   std::vector<Bytes> payloads;
   std::uint32_t before_ms = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    const CableSetpoint& point = motion[(k + 1) * motion.size() / count - 1];
-    if (!(point.time_s > 0 && point.time_s < 1000) || point.lengths_m.size() != to_um.size())
-      throw Error(ErrorCode::invalid_argument, "setpoints need times below 1000 s and a length for each cable",
-                  "motion");
-    const auto at_ms = std::uint32_t(std::llround(point.time_s * 1e3));
-    if (at_ms <= before_ms || at_ms - before_ms > 60000)
-      throw Error(ErrorCode::invalid_argument, "setpoints must be 1 ms … 60 s apart, in order", "motion");
-    std::vector<std::int32_t> lengths_um;
-    for (const double m : point.lengths_m) lengths_um.push_back(micrometres(m, "motion"));
+  for (std::uint32_t k = 0; k < count && duration_ms >= count; ++k) {
+    const auto at_ms = std::uint32_t(std::uint64_t(k + 1) * duration_ms / count);
+    std::vector<std::int32_t> lengths_um = to_um;
+    if (k + 1 < count) {
+      const CableVector lengths_m = cable_lengths(mechanism_, pose_at(move, at_ms * 1e-3));
+      for (std::size_t i = 0; i < lengths_um.size(); ++i)
+        lengths_um[i] = micrometres(lengths_m[Eigen::Index(i)], "move");
+    }
     Bytes& payload = payloads.emplace_back();
     append_u8(payload, std::uint8_t(k));
     append_u16(payload, std::uint16_t(at_ms - before_ms));
-    append_lengths(payload, k + 1 < count ? lengths_um : to_um);
+    append_lengths(payload, lengths_um);
     before_ms = at_ms;
   }
   return payloads;
 }
 
 /// Seconds until it is there; nothing: some reply was lost, and nothing moves.
-std::optional<double> SerialRobot::try_begin(const std::vector<Bytes>& setpoints, Type last, const Bytes& payload) {
+std::optional<double> SerialRobot::try_begin(const std::vector<Bytes>& setpoints, Type last, const Bytes& payload,
+                                             SerialLink::Answer& answer) {
   for (const Bytes& setpoint : setpoints) {
-    const auto answer = link_->request(Type::setpoint, setpoint);
-    if (answer.kind == Kind::nak) fail_nak("setpoint", answer);
+    answer = link_->request(Type::setpoint, setpoint);
     if (answer.kind != Kind::ack) return std::nullopt;
   }
-  const auto answer = link_->request(last, payload);
-  if (answer.kind == Kind::nak) fail_nak("move", answer);
+  answer = link_->request(last, payload);
   if (answer.kind == Kind::ack) {
     PayloadReader in(answer.data);
     return in.u32() * 1e-3;
   }
+  if (answer.kind == Kind::nak) return std::nullopt;
   // It may have begun all the same. What moves now can only be this.
   const Status now = status();
   if (now.has(flag::moving)) return now.to_go_s;
   return std::nullopt;
 }
 
-double SerialRobot::begin(const std::vector<CableSetpoint>& motion, const std::vector<std::int32_t>& to_um) {
-  const auto queue = setpoints(motion, to_um);
+/// Seconds until it is there; nothing: the controller finds this beyond its limits of speed and acceleration.
+std::optional<double> SerialRobot::begin(const std::vector<Bytes>& setpoints, const std::vector<std::int32_t>& to_um) {
   Bytes payload;
-  if (queue.empty())
+  if (setpoints.empty())
     append_lengths(payload, to_um);
   else
-    append_u8(payload, std::uint8_t(queue.size()));
-  for (int i = 0; i < kTries; ++i)
-    if (const auto seconds = try_begin(queue, queue.empty() ? Type::move : Type::start, payload)) return *seconds;
+    append_u8(payload, std::uint8_t(setpoints.size()));
+  SerialLink::Answer answer;
+  for (int i = 0; i < kTries; ++i) {
+    const Type last = setpoints.empty() ? Type::move : Type::start;
+    if (const auto seconds = try_begin(setpoints, last, payload, answer)) return *seconds;
+    if (answer.kind == Kind::nak && answer.code == NakCode::limit && last == Type::start) return std::nullopt;
+    if (answer.kind == Kind::nak) fail_nak("move", answer);
+  }
   fail("move: the controller does not answer; check its power and the line");
+}
+
+double SerialRobot::begin(const Status& now, const PlannedStop& stop, const std::vector<std::int32_t>& to_um) {
+  if (!options_.straight) return *begin({}, to_um);
+  const Move move = plan_move(mechanism_, pose_of(now.lengths_um, stop), stop.world_from_platform);
+  // The cubic between setpoints may exceed the profile's acceleration a little; then the same way takes more time.
+  for (const double factor : kSlower) {
+    const auto points = setpoints(move, factor, to_um);
+    if (const auto seconds = begin(points, to_um)) return *seconds;
+  }
+  fail("move: " + nak_words(NakCode::limit) + " of speed or acceleration, even in twice the planned time");
 }
 
 void SerialRobot::wait_for_rest(double patience_s, Job& job) {
@@ -208,19 +257,15 @@ void SerialRobot::move_to(const PlannedStop& stop, Job& job) {
   try {
     const Status before = status();
     if (!before.has(flag::position_known)) fail("move: " + nak_words(NakCode::position));
-    std::vector<CableSetpoint> motion;
-    if (options_.motion) {
-      std::vector<double> from_m;
-      for (const std::int32_t um : before.lengths_um) from_m.push_back(um * 1e-6);
-      motion = options_.motion(from_m, stop);
-    }
-    wait_for_rest(begin(motion, to_um) + kMargin_s, job);
+    wait_for_rest(begin(before, stop, to_um) + kMargin_s, job);
     const Status after = status();
     if (after.has(flag::emergency_stop)) fail("move: " + nak_words(NakCode::stopped));
     if (!after.has(flag::position_known)) fail("move: the controller restarted on the way; the position is not known");
     if (after.has(flag::broken_off) || after.lengths_um != to_um)
       fail(after.has(flag::host_lost) ? "move: broken off, for the controller did not hear this program for 1.5 s"
                                       : "move: broken off before its end");
+    at_ = stop.world_from_platform;
+    at_um_ = to_um;
   } catch (...) {
     make_safe();
     throw;
@@ -272,6 +317,8 @@ void SerialRobot::declare_position(const PlannedStop& stop) {
   append_lengths(payload, lengths_um);
   ask(Type::declare, payload, "declare position");
   roll_rad_ = stop.roll_rad;
+  at_ = stop.world_from_platform;
+  at_um_ = lengths_um;
 }
 
 void SerialRobot::make_safe() noexcept {

@@ -4,10 +4,8 @@
 #include <lumihull/capture/robot.h>
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <string>
-#include <vector>
 
 namespace lumihull::capture {
 
@@ -29,27 +27,22 @@ class SerialLink;
 /// not a serial port, nothing answers, another version of the protocol).
 LUMIHULL_API std::shared_ptr<SerialLink> open_serial_link(const SerialOptions& options);
 
-/// Where all winches are to be, `time_s` after the start of a motion.
-struct CableSetpoint {
-  double time_s = 0;
-  std::vector<double> lengths_m;
-};
-
 struct SerialRobotOptions {
-  /// The motion from the present lengths to a stop: setpoints at rising times > 0, the last one at the stop's lengths.
-  /// More than the controller holds (64) are thinned out. Empty: the controller moves all cables in proportion, with
-  /// constant acceleration, speed, deceleration.
-  std::function<std::vector<CableSetpoint>(const std::vector<double>& from_m, const PlannedStop& to)> motion;
+  /// Moves run as `plan_move` plans them: along the straight line that the planner has checked, jerk bounded. The
+  /// controller holds up to 64 setpoints of it and a cubic between them. false: the controller moves all cables in
+  /// proportion, with constant acceleration, speed, deceleration; nothing is known of the platform's way then.
+  bool straight = true;
   double solenoid_s = 1.5;  ///< how long the bearing is released for a turn; the controller has a limit, too
 };
 
 /// The winches. `mechanism` gives number and limits of the cables, which the controller checks itself before anything
 /// moves.
 ///
-/// move_to: Error{invalid_argument} where the stop has no lengths for this mechanism; Error{io} where the controller
-/// refuses, the position is not known, or a move was broken off. set_roll releases the bearing where the angle is
-/// another than at the last call or declare_position; gravity turns the camera. Before either, only declare_position
-/// gives an angle. Errors of the construction: invalid_argument (options, another number of winches), io.
+/// move_to: Error{invalid_argument} where the stop's lengths are not those of this mechanism (straight: at its pose, to
+/// 1 µm); Error{io} where the controller refuses, the position is not known, or a move was broken off. After that the
+/// next one goes on from where the platform hangs by its lengths (`hang_rigid`). set_roll releases the bearing where
+/// the angle is another than at the last call or declare_position; gravity turns the camera. Errors of the
+/// construction: invalid_argument (options, another number of winches), bad_input (check(mechanism)), io.
 LUMIHULL_API std::unique_ptr<Robot> open_serial_robot(std::shared_ptr<SerialLink> link, const Mechanism& mechanism,
                                                       const SerialRobotOptions& options = {});
 
