@@ -19,7 +19,7 @@ namespace {
 using namespace capture;
 using testing::HasSubstr;
 
-constexpr double kSpeed = 20;
+constexpr double kSpeed = 10;
 
 /// Six cables; where they run does not matter here.
 Mechanism six_cables() {
@@ -52,7 +52,7 @@ struct Rig {
   explicit Rig(std::vector<std::string> faults = {}, const SerialRobotOptions& options = {.straight = false},
                const Mechanism& mechanism = six_cables())
       : simulator([&] {
-          faults.insert(faults.end(), {"--speed", "20"});
+          faults.insert(faults.end(), {"--speed", "10"});
           return faults;
         }()) {
     SerialOptions serial;

@@ -89,7 +89,8 @@ void SerialPort::configure(unsigned speed) {
   settings.c_iflag &= ~tcflag_t(IGNBRK | BRKINT | PARMRK | ISTRIP | INLCR | IGNCR | ICRNL | IXON | IXOFF);
   settings.c_oflag &= ~tcflag_t(OPOST);
   settings.c_lflag &= ~tcflag_t(ECHO | ECHONL | ICANON | ISIG | IEXTEN);
-  settings.c_cflag &= ~tcflag_t(CSIZE | PARENB | CSTOPB | CRTSCTS);
+  // No HUPCL: many boards restart when DTR falls, and then they would have lost their position.
+  settings.c_cflag &= ~tcflag_t(CSIZE | PARENB | CSTOPB | CRTSCTS | HUPCL);
   settings.c_cflag |= CS8 | CREAD | CLOCAL;
   settings.c_cc[VMIN] = 0;
   settings.c_cc[VTIME] = 0;

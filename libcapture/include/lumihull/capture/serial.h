@@ -41,8 +41,8 @@ struct SerialRobotOptions {
 /// move_to: Error{invalid_argument} where the stop's lengths are not those of this mechanism (straight: at its pose, to
 /// 1 µm); Error{io} where the controller refuses, the position is not known, or a move was broken off. After that the
 /// next one goes on from where the platform hangs by its lengths (`hang_rigid`). set_roll releases the bearing where
-/// the angle is another than at the last call or declare_position; gravity turns the camera. Errors of the
-/// construction: invalid_argument (options, another number of winches), bad_input (check(mechanism)), io.
+/// the angle is another than at the last call or declare_position (or there was none); gravity turns the camera. Errors
+/// of the construction: invalid_argument (options, another number of winches), bad_input (check(mechanism)), io.
 LUMIHULL_API std::unique_ptr<Robot> open_serial_robot(std::shared_ptr<SerialLink> link, const Mechanism& mechanism,
                                                       const SerialRobotOptions& options = {});
 
