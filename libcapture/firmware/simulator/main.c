@@ -32,7 +32,7 @@ typedef struct {
 
   uint64_t now_ms;
   uint64_t reboot_at_ms, boot_at_ms; /* 0: not planned */
-  uint64_t moves_at_ms, noted_at_ms;
+  uint64_t note_at_ms; /* of the next line about a move */
   bool running, deaf, stopped, moving;
   uint32_t boots;
   sim_channel in, out;
@@ -200,10 +200,10 @@ static void note_moves(simulator *sim) {
   const bool moving = sim->running && sim->controller.motion.path != FW_REST;
   if (moving != sim->moving) {
     sim->moving = moving;
-    sim->moves_at_ms = sim->now_ms;
+    sim->note_at_ms = sim->now_ms + 25;
     note_lengths(sim, moving ? "moves" : "rests");
-  } else if (moving && (sim->now_ms - sim->moves_at_ms) % 25 == 0 && sim->now_ms != sim->noted_at_ms) {
-    sim->noted_at_ms = sim->now_ms;
+  } else if (moving && sim->now_ms >= sim->note_at_ms) {
+    sim->note_at_ms += 25;
     note_lengths(sim, "at");
   }
 }
