@@ -106,37 +106,54 @@ double imbalance(const Mechanism& m, const Hanging& h) {
   return force.norm() + torque.norm();
 }
 
-TEST(HangElastic, EnergyIsNotAboveNloptsFromTheSameStart) {
+/// SLSQP from a start; its own limits of rounding are near enough.
+std::vector<double> minimise(nlopt::opt& opt, std::vector<double> x) {
+  opt.set_xtol_abs(1e-10);
+  opt.set_maxeval(3000);
+  double least = 0;
+  try {
+    opt.optimize(x, least);
+  } catch (const std::exception&) {
+  }
+  return x;
+}
+
+TEST(HangElastic, NloptFindsTheSameMinimum) {
   test::Random random(21);
-  int same = 0, total = 0;
-  for (int i = 0; i < 300; ++i) {
-    Mechanism m = i % 3 ? paper_mechanism() : test::random_mechanism(random, random.integer(6, 9));
+  int commanded = 0, total = 0, alike = 0, paper = 0;
+  for (int i = 0; i < 600; ++i) {
+    const bool of_paper = i % 3 != 0;
+    Mechanism m = of_paper ? paper_mechanism() : test::random_mechanism(random, random.integer(6, 9));
     for (Cable& cable : m.cables) cable.stiffness_N = 3e4;
     const Pose pose = view_pose(random);
-    if (tensions(m, pose).balance != Balance::controlled) continue;
+    if (static_test(m, pose) != Balance::controlled) continue;
     const CableVector unstrained = unstrained_lengths(m, pose);
     const Pose start = start_near(random, pose);
     const Hanging found = hang_elastic(m, span(unstrained), start);
-    ++total;
-    Energy energy{&m, &unstrained, start};
+    EXPECT_LT(imbalance(m, found), 1e-5) << i;
+    ++total, paper += of_paper;
+    commanded += distance(found.world_from_platform, pose) < 1e-8;
+    // From beside what was found, NLopt comes back to it.
+    Energy energy{&m, &unstrained, found.world_from_platform};
     nlopt::opt opt(nlopt::LD_SLSQP, 6);
     opt.set_min_objective(&Energy::call, &energy);
-    opt.set_xtol_abs(1e-10);
-    opt.set_maxeval(3000);
-    std::vector<double> x(6, 0.0);
-    double least = 0;
-    try {
-      opt.optimize(x, least);
-    } catch (const std::exception&) {  // its roundoff limit is near enough
-    }
-    Energy here{&m, &unstrained, found.world_from_platform};
-    EXPECT_LT(here(std::vector<double>(6, 0.0)), energy(x) + 1e-6) << i;
-    EXPECT_LT(imbalance(m, found), 1e-5) << i;
-    same += distance(found.world_from_platform, pose) < 1e-8;
+    opt.set_lower_bounds(-0.02);  // SLSQP's first step may be long
+    opt.set_upper_bounds(0.02);
+    std::vector<double> near(6);
+    for (double& v : near) v = random.uniform(-0.002, 0.002);
+    EXPECT_GT(energy(minimise(opt, near)), energy(std::vector<double>(6, 0.0)) - 1e-7) << i;
+    // From the same start it may go elsewhere, but mostly does not.
+    if (!of_paper) continue;
+    Energy far{&m, &unstrained, start};
+    nlopt::opt again(nlopt::LD_SLSQP, 6);
+    again.set_min_objective(&Energy::call, &far);
+    alike += distance(pose_of(minimise(again, std::vector<double>(6, 0.0)), start), found.world_from_platform) < 1e-4;
   }
-  std::printf("%d of %d elastic equilibria are the commanded ones\n", same, total);
-  EXPECT_GT(total, 180);
-  EXPECT_GE(same, total - (total + 999) / 1000);
+  std::printf("%d of %d are the commanded ones; NLopt comes to the same from the same start in %d of %d\n", commanded,
+              total, alike, paper);
+  EXPECT_GT(total, 400);
+  EXPECT_EQ(commanded, total);
+  EXPECT_GT(alike, paper * 9 / 10);
 }
 
 TEST(HangRigid, SlackCablesHangWhereNloptFindsTheLeastHeight) {
@@ -174,16 +191,9 @@ TEST(HangRigid, SlackCablesHangWhereNloptFindsTheLeastHeight) {
     nlopt::opt opt(nlopt::LD_SLSQP, 6);
     opt.set_min_objective(&Height::call, &objective);
     for (Excess& e : excess) opt.add_inequality_constraint(&Excess::call, &e, 1e-9);
-    opt.set_xtol_abs(1e-9);
-    opt.set_maxeval(500);
     std::vector<double> x(6);
     for (double& v : x) v = random.uniform(-0.003, 0.003);
-    double least = 0;
-    try {
-      opt.optimize(x, least);
-    } catch (const std::exception&) {
-      continue;
-    }
+    x = minimise(opt, x);
     bool feasible = true;
     for (std::size_t k = 0; k < m.cables.size(); ++k)
       feasible = feasible && length(m, k, pose_of(x, from)) < lengths[Eigen::Index(k)] + 1e-8;

@@ -100,6 +100,15 @@ TEST(TensionsProgram, SameVerdictAndNormAsExactPrograms) {
     if (expected == Balance::unbalanced) {
       ASSERT_GT(found.residual_N, 1e-7);
       ASSERT_GE(found.tension_N.minCoeff(), 0);
+      // Least residual: no tension could be raised for the better, none above zero changed.
+      WrenchMatrix w = task.w;
+      Eigen::Matrix<double, 6, 1> rest = task.load;
+      w.bottomRows<3>() /= characteristic_length(m), rest.tail<3>() /= characteristic_length(m);
+      rest -= w * found.tension_N;
+      ASSERT_NEAR(rest.norm(), found.residual_N, 1e-9);
+      const CableVector slope = w.transpose() * rest;
+      ASSERT_LT(slope.maxCoeff(), 1e-10 * task.load.norm()) << k;
+      ASSERT_LT(slope.cwiseProduct(found.tension_N).cwiseAbs().maxCoeff(), 1e-8 * task.load.norm()) << k;
       continue;
     }
     ASSERT_LT(found.residual_N, 1e-6);

@@ -19,6 +19,7 @@ using internal::Springs;
 using internal::Vector6;
 
 constexpr double kLengthsMet_m = 1e-11;
+constexpr double kStretch_m = 0.02;  ///< of an elastic cable, more or less
 
 CableVector need_lengths(const Mechanism& mechanism, std::span<const double> lengths, const Pose& start) {
   internal::need_usable(mechanism, start);
@@ -32,20 +33,25 @@ CableVector need_lengths(const Mechanism& mechanism, std::span<const double> len
   return CableVector::Map(lengths.data(), Eigen::Index(lengths.size()));
 }
 
-/// Newton's method on six lengths; nullopt where it leaves the start's surroundings or does not settle.
-std::optional<Pose> meet_six_lengths(const Mechanism& mechanism, const CableVector& lengths, const Pose& start,
-                                     int* iterations) {
+/// Newton's method on six lengths or more (then Gauss's, on their squares); nullopt where it does not settle to
+/// `accuracy`.
+std::optional<Pose> meet_lengths(const Mechanism& mechanism, const CableVector& lengths, const Pose& start,
+                                 double accuracy, int* iterations) {
   Pose pose = start;
   const double size = characteristic_length(mechanism);
   double before = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 30; ++i) {
-    const Vector6 excess = cable_lengths(mechanism, pose) - lengths;
+    const CableVector excess = cable_lengths(mechanism, pose) - lengths;
     const double now = excess.cwiseAbs().maxCoeff();
-    if (now < kLengthsMet_m && !(now < 0.5 * before)) return pose;  // until rounding stops it
-    if (i > 8 && !(now < before) && now > kLengthsMet_m) return std::nullopt;
+    if (now < accuracy && !(now < 0.5 * before)) return pose;  // until rounding stops it
+    if (i > 8 && !(now < before) && now > accuracy) return std::nullopt;
     before = now;
-    const Eigen::PartialPivLU<Matrix6> lu(Matrix6(wrench_matrix(mechanism, pose).transpose()));
-    Vector6 twist = lu.solve(excess);
+    const WrenchMatrix w = wrench_matrix(mechanism, pose);
+    Vector6 twist;
+    if (lengths.size() == 6)
+      twist = Matrix6(w.transpose()).partialPivLu().solve(Vector6(excess));
+    else
+      twist = Matrix6(w * w.transpose()).partialPivLu().solve(Vector6(w * excess));
     if (!twist.allFinite()) return std::nullopt;
     const double far = std::max(twist.head<3>().norm(), size * twist.tail<3>().norm());
     if (far > 0.2) twist *= 0.2 / far;
@@ -143,7 +149,7 @@ Hanging hang_rigid(const Mechanism& mechanism, std::span<const double> lengths_m
   const CableVector lengths = need_lengths(mechanism, lengths_m, start);
   Hanging result;
   if (lengths.size() == 6) {
-    if (const auto pose = meet_six_lengths(mechanism, lengths, start, &result.iterations)) {
+    if (const auto pose = meet_lengths(mechanism, lengths, start, kLengthsMet_m, &result.iterations)) {
       const Tensions held = tensions(mechanism, *pose);
       if (held.balance == Balance::controlled || held.balance == Balance::loose) {
         result.world_from_platform = *pose;
@@ -166,11 +172,21 @@ Hanging hang_elastic(const Mechanism& mechanism, std::span<const double> unstrai
       throw Error(ErrorCode::invalid_argument, "expected stiffness_N > 0", "cable " + cable.name);
     springs.stiffness_N_m[i] = cable.stiffness_N / springs.natural_m[i];
   }
-  const internal::Minimum minimum = internal::minimise_energy(mechanism, springs, start, 1e-10);
-  if (!minimum.converged) throw Error(ErrorCode::degenerate, "no equilibrium was found near the start", mechanism.name);
   Hanging result;
+  // Stiff cables far from their lengths throw the platform out of its valley: where the lengths alone lead to a pose
+  // (they stretch by millimetres), the search starts there.
+  Pose from = start;
+  if (springs.natural_m.size() >= 6) {
+    const auto energy = [&](const Pose& pose) {
+      return internal::spring_energy(mechanism, springs, pose, nullptr, nullptr);
+    };
+    const auto near = meet_lengths(mechanism, springs.natural_m, start, kStretch_m, &result.iterations);
+    if (near && energy(*near) < energy(start)) from = *near;
+  }
+  const internal::Minimum minimum = internal::minimise_energy(mechanism, springs, from, 1e-10);
+  if (!minimum.converged) throw Error(ErrorCode::degenerate, "no equilibrium was found near the start", mechanism.name);
   result.world_from_platform = minimum.pose;
-  result.iterations = minimum.iterations;
+  result.iterations += minimum.iterations;
   result.tension_N = (cable_lengths(mechanism, minimum.pose) - springs.natural_m).cwiseMax(0);
   result.taut = result.tension_N.minCoeff() > 0;
   result.tension_N = result.tension_N.cwiseProduct(springs.stiffness_N_m);
