@@ -226,6 +226,22 @@ TEST(Firmware, ExposuresAndTheSolenoidEndByThemselvesAndWithinLimits) {
   EXPECT_EQ(shot_state(machine, 1), FiredState::done);
 }
 
+TEST(Firmware, AFloodOfNoiseDoesNotHoldUpTheOutputs) {
+  FakeMachine machine;
+  greet(machine);
+  ASSERT_TRUE(acked(machine.ask(Type::solenoid, numbers({1200}))));
+  std::mt19937 random(8);
+  while (machine.incoming.size() < 2'000'000) machine.incoming.push_back(std::uint8_t(random()));
+  machine.pass(1199);
+  EXPECT_TRUE(machine.solenoid);
+  machine.pass(1);
+  EXPECT_FALSE(machine.solenoid);
+  EXPECT_FALSE(machine.incoming.empty());
+  machine.incoming.clear();
+  machine.ask(Type::stop, {7});  // may end the noise's last stretch
+  EXPECT_TRUE(acked(machine.ask(Type::hello, numbers({77}))));
+}
+
 TEST(Firmware, AfterThreeMissedHeartbeatsEverythingIsSafe) {
   for (const bool moving : {false, true}) {
     FakeMachine machine;
