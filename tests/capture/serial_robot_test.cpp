@@ -196,8 +196,21 @@ TEST(SerialRobot, ThePlatformGoesAlongThePlannedLine) {
   EXPECT_THAT(error_of([&] { rig.robot->move_to(wrong, job); }, ErrorCode::invalid_argument), HasSubstr("pose"));
 }
 
+TEST(SerialRobot, AStopBeyondACablesLengthIsRefusedWithItsName) {
+  Mechanism mechanism = paper_mechanism();
+  const PlannedStop a = stop_at(mechanism, "a", {0.2, -0.5, 1.5}, 0),
+                    b = stop_at(mechanism, "b", {-0.6, 0.7, 2.0}, 0.3);
+  std::size_t longer = 0;
+  while (b.lengths_m[longer] < a.lengths_m[longer] + 0.1) ++longer;
+  mechanism.cables[longer].max_length_m = a.lengths_m[longer] + 0.05;
+  Rig rig({}, {.straight = true}, mechanism);
+  rig.robot->declare_position(a);
+  EXPECT_THAT(error_of([&] { rig.robot->move_to(b, rig.job); }),
+              HasSubstr("limit, cable \"" + mechanism.cables[longer].name + "\""));
+  EXPECT_FALSE(ever_moved(rig.simulator));
+}
+
 TEST(SerialRobot, WhatTheControllerFindsTooFastTakesMoreTime) {
-  // A controller in doubt about its winches; the mechanism's own limits would allow what the platform does.
   Mechanism mechanism = paper_mechanism();
   mechanism.limits = {2, 3, 1000, 0.8,
                       0.6};  // next to no limit of jerk: the cubic overshoots the winches' acceleration

@@ -70,8 +70,11 @@ class SerialRobot final : public Robot {
   std::vector<std::int32_t> lengths_of(const PlannedStop& stop) const;
   Pose pose_of(const std::vector<std::int32_t>& lengths_um, const PlannedStop& to) const;
   std::vector<Bytes> setpoints(Move move, double factor, const std::vector<std::int32_t>& to_um) const;
-  std::optional<double> try_begin(const std::vector<Bytes>& setpoints, Type last, const Bytes& payload,
-                                  SerialLink::Answer& answer);
+  struct Begun {
+    SerialLink::Answer answer;
+    double seconds = 0;  ///< of an ACK: until it is there
+  };
+  Begun try_begin(const std::vector<Bytes>& setpoints, const std::vector<std::int32_t>& to_um);
   std::optional<double> begin(const std::vector<Bytes>& setpoints, const std::vector<std::int32_t>& to_um);
   double begin(const Status& now, const PlannedStop& stop, const std::vector<std::int32_t>& to_um);
   void append_lengths(Bytes& payload, const std::vector<std::int32_t>& lengths_um) const;
@@ -195,51 +198,50 @@ std::vector<Bytes> SerialRobot::setpoints(Move move, double factor, const std::v
   return payloads;
 }
 
-/// Seconds until it is there; nothing: some reply was lost, and nothing moves.
-std::optional<double> SerialRobot::try_begin(const std::vector<Bytes>& setpoints, Type last, const Bytes& payload,
-                                             SerialLink::Answer& answer) {
+/// Tells the setpoints, then START, or MOVE where there are none; the answer to the last that was said. Where there is
+/// no reply nothing moves.
+SerialRobot::Begun SerialRobot::try_begin(const std::vector<Bytes>& setpoints, const std::vector<std::int32_t>& to_um) {
   for (const Bytes& setpoint : setpoints) {
-    answer = link_->request(Type::setpoint, setpoint);
-    if (answer.kind != Kind::ack) return std::nullopt;
+    const auto answer = link_->request(Type::setpoint, setpoint);
+    if (answer.kind == Kind::nak) fail_nak("move", answer);
+    if (answer.kind != Kind::ack) return {answer, 0};
   }
-  answer = link_->request(last, payload);
-  if (answer.kind == Kind::ack) {
-    PayloadReader in(answer.data);
-    return in.u32() * 1e-3;
-  }
-  if (answer.kind == Kind::nak) return std::nullopt;
-  // It may have begun all the same. What moves now can only be this.
-  const Status now = status();
-  if (now.has(flag::moving)) return now.to_go_s;
-  return std::nullopt;
-}
-
-/// Seconds until it is there; nothing: the controller finds this beyond its limits of speed and acceleration.
-std::optional<double> SerialRobot::begin(const std::vector<Bytes>& setpoints, const std::vector<std::int32_t>& to_um) {
   Bytes payload;
   if (setpoints.empty())
     append_lengths(payload, to_um);
   else
     append_u8(payload, std::uint8_t(setpoints.size()));
-  SerialLink::Answer answer;
+  auto answer = link_->request(setpoints.empty() ? Type::move : Type::start, payload);
+  if (answer.kind == Kind::ack) {
+    PayloadReader in(answer.data);
+    return {answer, in.u32() * 1e-3};
+  }
+  if (answer.kind == Kind::nak) return {answer, 0};
+  // It may have begun all the same. What moves now, or stands there, can only be this.
+  const Status now = status();
+  if (now.has(flag::moving) || now.lengths_um == to_um) answer.kind = Kind::ack;
+  return {answer, now.to_go_s};
+}
+
+/// Seconds until it is there; nothing: the controller finds this beyond its limits of speed and acceleration.
+std::optional<double> SerialRobot::begin(const std::vector<Bytes>& setpoints, const std::vector<std::int32_t>& to_um) {
   for (int i = 0; i < kTries; ++i) {
-    const Type last = setpoints.empty() ? Type::move : Type::start;
-    if (const auto seconds = try_begin(setpoints, last, payload, answer)) return *seconds;
-    if (answer.kind == Kind::nak && answer.code == NakCode::limit && last == Type::start) return std::nullopt;
+    const auto [answer, seconds] = try_begin(setpoints, to_um);
+    if (answer.kind == Kind::ack) return seconds;
+    if (answer.kind == Kind::nak && answer.code == NakCode::limit && !setpoints.empty()) return std::nullopt;
     if (answer.kind == Kind::nak) fail_nak("move", answer);
   }
   fail("move: the controller does not answer; check its power and the line");
 }
 
+/// Seconds until it is there.
 double SerialRobot::begin(const Status& now, const PlannedStop& stop, const std::vector<std::int32_t>& to_um) {
-  if (!options_.straight) return *begin({}, to_um);
+  if (!options_.straight) return *begin({}, to_um);  // of a MOVE the controller finds the time
   const Move move = plan_move(mechanism_, pose_of(now.lengths_um, stop), stop.world_from_platform);
   // The cubic between setpoints may exceed the profile's acceleration a little; then the same way takes more time.
-  for (const double factor : kSlower) {
-    const auto points = setpoints(move, factor, to_um);
-    if (const auto seconds = begin(points, to_um)) return *seconds;
-  }
-  fail("move: " + nak_words(NakCode::limit) + " of speed or acceleration, even in twice the planned time");
+  for (const double factor : kSlower)
+    if (const auto seconds = begin(setpoints(move, factor, to_um), to_um)) return *seconds;
+  fail("move: " + nak_words(NakCode::limit) + " of the winches, even in twice the planned time");
 }
 
 void SerialRobot::wait_for_rest(double patience_s, Job& job) {
@@ -283,12 +285,12 @@ void SerialRobot::set_roll(double roll_rad, Job& job) {
     for (double waited_s = 0;; waited_s += kPoll_s) {
       job.check();
       const auto answer = link_->request(Type::solenoid, payload);
+      if (answer.kind != Kind::nak) roll_rad_ = std::numeric_limits<double>::quiet_NaN();  // it may turn now
       if (answer.kind == Kind::ack) break;
       if (answer.kind != Kind::nak) fail("bearing: the controller does not answer; check its power and the line");
       if (answer.code != NakCode::busy || waited_s > 2 * limit_s) fail_nak("bearing", answer);
       link_->sleep(kPoll_s);
     }
-    roll_rad_ = std::numeric_limits<double>::quiet_NaN();  // somewhere in between
     for (double waited_s = 0; status().has(flag::solenoid); waited_s += kPoll_s) {
       job.check();
       if (waited_s > options_.solenoid_s + kMargin_s) fail("bearing: the solenoid stays on");
