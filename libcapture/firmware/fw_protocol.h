@@ -1,0 +1,56 @@
+/* Numbers of PROTOCOL.md, sections 3 to 5. */
+#ifndef LUMIHULL_FW_PROTOCOL_H
+#define LUMIHULL_FW_PROTOCOL_H
+
+enum fw_type {
+  FW_HELLO = 0x01,
+  FW_HEARTBEAT = 0x02,
+  FW_STATUS = 0x03,
+  FW_SHOT_STATUS = 0x04,
+  FW_FIRE = 0x10,
+  FW_SOLENOID = 0x11,
+  FW_LIMITS = 0x20,
+  FW_DECLARE = 0x21,
+  FW_MOVE = 0x22,
+  FW_SETPOINT = 0x23,
+  FW_START = 0x24,
+  FW_STOP = 0x25,
+  FW_ACK = 0x80,
+  FW_NAK = 0x81,
+  FW_DONE = 0x82
+};
+
+enum fw_code {
+  FW_BAD_VERSION = 1,
+  FW_BAD_NONCE = 2,
+  FW_BAD_SEQUENCE = 3,
+  FW_BAD_TYPE = 4,
+  FW_BAD_PAYLOAD = 5,
+  FW_LIMIT = 6,
+  FW_BUSY = 7,
+  FW_STOPPED = 8,
+  FW_NO_POSITION = 9,
+  FW_NO_LIMITS = 10,
+  FW_SHOT_KNOWN = 11,
+  FW_BAD_QUEUE = 12,
+  FW_SHOT_OLD = 13
+};
+
+enum fw_flag {
+  FW_FLAG_MOVING = 1 << 0,
+  FW_FLAG_POSITION_KNOWN = 1 << 1,
+  FW_FLAG_EMERGENCY_STOP = 1 << 2,
+  FW_FLAG_EXPOSING = 1 << 3,
+  FW_FLAG_SOLENOID = 1 << 4,
+  FW_FLAG_HOST_LOST = 1 << 5,
+  FW_FLAG_LIMITS_SET = 1 << 6,
+  FW_FLAG_BROKEN_OFF = 1 << 7
+};
+
+enum fw_shot_state { FW_SHOT_NONE, FW_SHOT_EXPOSING, FW_SHOT_DONE, FW_SHOT_CUT, FW_SHOT_FORGOTTEN };
+
+enum fw_what { FW_STOP_MOVE = 1, FW_STOP_SOLENOID = 2, FW_STOP_EXPOSURE = 4, FW_STOP_ALL = 7 };
+
+#define FW_HOST_SILENT_MS 1500 /* three heartbeats */
+
+#endif
