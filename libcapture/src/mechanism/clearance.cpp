@@ -29,6 +29,12 @@ double object_distance(const KeepOut& object, const Eigen::Vector3d& point) {
 
 /// The least of a convex function along a segment, by golden sections.
 double object_distance(const KeepOut& object, const Segment& segment) {
+  // Above the base the solid is what lies within the radius of its axis; outside of it that is quick to tell.
+  if (std::min(segment.from.z(), segment.to.z()) >= object.base.z()) {
+    const Segment axis{object.base, object.base + Eigen::Vector3d(0, 0, object.height_m)};
+    const double outside = internal::distance(segment, axis) - object.radius_m;
+    if (outside > 0) return outside;
+  }
   const auto at = [&](double s) {
     return object_distance(object, Eigen::Vector3d(segment.from + s * (segment.to - segment.from)));
   };
