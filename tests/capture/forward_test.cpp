@@ -70,13 +70,10 @@ TEST(HangRigid, TenThousandStarts) {
   const Mechanism m = paper_mechanism();
   test::Random random(2);
   double worst = 0;
-  int failed = 0, iterations = 0;
+  int failed = 0, iterations = 0, outside = 0;
   for (int i = 0; i < 10000; ++i) {
-    const Pose pose = view_pose(random);
-    if (static_test(m, pose) != Balance::controlled) {
-      ++failed;
-      continue;
-    }
+    Pose pose = view_pose(random);
+    while (static_test(m, pose) != Balance::controlled) pose = view_pose(random), ++outside;
     const Hanging found = hang_rigid(m, span(cable_lengths(m, pose)), start_near(random, pose));
     const double error = distance(found.world_from_platform, pose);
     worst = std::max(worst, error);
@@ -86,8 +83,9 @@ TEST(HangRigid, TenThousandStarts) {
   }
   EXPECT_EQ(failed, 0);
   EXPECT_LT(worst, 1e-9);
-  RecordProperty("worst_m", std::to_string(worst));
-  RecordProperty("iterations", std::to_string(iterations / 1e4));
+  EXPECT_LT(outside, 100);
+  std::printf("worst %g m, %g steps of Newton, %d poses outside the controlled workspace\n", worst, iterations / 1e4,
+              outside);
 }
 
 TEST(HangElastic, RightEquilibriumFromAWarmStart) {

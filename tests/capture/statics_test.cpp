@@ -53,8 +53,8 @@ TEST(Tensions, PaperMechanismHoldsTheWholeHemisphere) {
       const Tensions found = tensions(m, pose);
       EXPECT_EQ(found.balance, Balance::controlled) << theta << ' ' << phi;
       EXPECT_GT(found.tension_N.minCoeff(), 1.5);
-      EXPECT_LT(found.tension_N.maxCoeff(), 35);
-      EXPECT_GT(found.smallest_singular, 0.4);
+      EXPECT_LT(found.tension_N.maxCoeff(), 60);
+      EXPECT_GT(found.smallest_singular, 0.25);
       EXPECT_LT(wrench_at(m, pose, found.tension_N).norm(), 1e-12 * 56 * 10);
       EXPECT_EQ(static_test(m, pose), Balance::controlled);
     }
