@@ -46,7 +46,8 @@ Matrix6 peer_wrench(const Mechanism& m, const Pose& pose, double length) {
   for (int i = 0; i < 6; ++i) {
     const Eigen::Vector3d c = q * m.cables[std::size_t(i)].attachment;
     const Eigen::Vector3d u = (m.cables[std::size_t(i)].departure - pose.translation - c).normalized();
-    w.col(i) << u, c.cross(u) / length;
+    w.col(i).head<3>() = u;
+    w.col(i).tail<3>() = c.cross(u) / length;
   }
   return w;
 }
@@ -54,7 +55,8 @@ Matrix6 peer_wrench(const Mechanism& m, const Pose& pose, double length) {
 Vector6 load(const Mechanism& m, const Pose& pose, double length) {
   const Eigen::Vector3d force(0, 0, m.mass_kg * m.gravity_m_s2);
   Vector6 f;
-  f << force, (pose.rotation * m.center_of_mass).cross(force) / length;
+  f.head<3>() = force;
+  f.tail<3>() = (pose.rotation * m.center_of_mass).cross(force) / length;
   return f;
 }
 

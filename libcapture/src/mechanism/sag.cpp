@@ -157,7 +157,8 @@ std::vector<HangingCable> sagging_cables(const Mechanism& mechanism, const Pose&
   const Eigen::Matrix3d q = world_from_platform.rotation.toRotationMatrix();
   const Eigen::Vector3d weight(0, 0, mechanism.mass_kg * mechanism.gravity_m_s2);
   Vector6 load, tension = straight.tension_N;
-  load << weight, (q * mechanism.center_of_mass).cross(weight);
+  load.head<3>() = weight;
+  load.tail<3>() = (q * mechanism.center_of_mass).cross(weight);
   std::vector<HangingCable> cables(6);
   // The pull's direction hardly changes with the tension: directions, then tensions, until both stay.
   for (int round = 0; round < 100; ++round) {
@@ -174,7 +175,8 @@ std::vector<HangingCable> sagging_cables(const Mechanism& mechanism, const Pose&
       }
       const HangingCable& hanging = cables[std::size_t(i)];
       const Eigen::Vector3d pull(hanging.pull_N * d.x() / along, hanging.pull_N * d.y() / along, hanging.lift_N);
-      w.col(i) << pull / tension[i], c.cross(pull / tension[i]);
+      w.col(i).head<3>() = pull / tension[i];
+      w.col(i).tail<3>() = c.cross(pull / tension[i]);
     }
     const Vector6 next = w.partialPivLu().solve(load);
     const double change = (next - tension).cwiseAbs().maxCoeff();

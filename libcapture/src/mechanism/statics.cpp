@@ -29,7 +29,8 @@ double weight_N(const Mechanism& mechanism) { return mechanism.mass_kg * mechani
 Vector6 scaled_load(const Mechanism& mechanism, const Pose& pose, double length) {
   const Eigen::Vector3d force(0, 0, weight_N(mechanism));
   Vector6 load;
-  load << force, (pose.rotation * mechanism.center_of_mass).cross(force) / length;
+  load.head<3>() = force;
+  load.tail<3>() = (pose.rotation * mechanism.center_of_mass).cross(force) / length;
   return load;
 }
 
@@ -207,7 +208,8 @@ WrenchMatrix wrench_matrix(const Mechanism& mechanism, const Pose& world_from_pl
     const Eigen::Vector3d d = cable.departure - world_from_platform.translation - c;
     const double length = d.norm();
     if (!(length > internal::kShortest_m)) internal::fail_without_direction(cable);
-    w.col(i) << d / length, c.cross(d / length);
+    w.col(i).head<3>() = d / length;
+    w.col(i).tail<3>() = c.cross(d / length);
   }
   return w;
 }
