@@ -140,15 +140,15 @@ void figures(const std::filesystem::path& folder) {
   const KeepOut object = object_of(m, 0.4);
   Workspace w;
   write_file(folder / "room.svg", draw_mechanism(m, w, &object, 0, 6));
-  w.azimuths = 72, w.polar_steps = 31;
   const WorkspaceReport report = examine(m, w, &object, job);
   write_file(folder / "balance.svg", draw_map(report, WorkspaceValue::balance));
   write_file(folder / "least_tension.svg", draw_map(report, WorkspaceValue::least_tension));
   write_file(folder / "clearance.svg", draw_map(report, WorkspaceValue::clearance));
   write_file(folder / "sensitivity.svg", draw_map(report, WorkspaceValue::rotation_sensitivity));
   write_file(folder / "tensions.svg", draw_tensions(report, m, 0));
-  write_file(folder / "tilt.svg", draw_tilt_ranges(m, w, 0, job));
   Workspace without = w;
+  w.polar_steps = 31;
+  write_file(folder / "tilt.svg", draw_tilt_ranges(m, w, 0, job));
   set_tilt(without, 0, std::numbers::pi / 2);
   write_file(folder / "balance_without_offset.svg",
              draw_map(examine(m, without, &object, job), WorkspaceValue::balance));
