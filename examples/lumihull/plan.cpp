@@ -106,15 +106,16 @@ HemisphereOptions views_of(const Arguments& a, double radius) {
   return views;
 }
 
-/// The object on its pedestal: from the floor to its top.
+/// The object on its pedestal: from the floor to its top. A sphere ends in the cap; a cylinder's rim lies under one
+/// that is a tenth wider, or under the sphere that holds it all.
 KeepOut keep_out(const Arguments& a, const HemisphereOptions& views, double floor) {
-  const double height = a.object.height_m > 0 ? a.object.height_m : a.object.diameter_m;
-  const double radius = 0.5 * a.object.diameter_m;
+  const double rim = 0.5 * a.object.diameter_m;
   KeepOut object;
-  object.radius_m = radius;
-  object.base = {views.center.x(), views.center.y(), std::min(floor, views.center.z() - 0.5 * height)};
-  // A sphere ends in the cap; a cylinder's flat top lies below one.
-  object.height_m = views.center.z() + (a.object.height_m > 0 ? 0.5 * height : 0) - object.base.z();
+  object.radius_m = a.object.height_m > 0 ? std::min(1.1 * rim, a.object.bounding_radius_m()) : rim;
+  const double cap =
+      a.object.height_m > 0 ? 0.5 * a.object.height_m - std::sqrt(object.radius_m * object.radius_m - rim * rim) : 0;
+  object.base = {views.center.x(), views.center.y(), std::min(floor, views.center.z() - a.object.bounding_radius_m())};
+  object.height_m = views.center.z() + std::max(0.0, cap) - object.base.z();
   return object;
 }
 
@@ -184,8 +185,8 @@ void say(Program& program, const Arguments& a, const PlannedTour& tour, const Pl
   if (tour.plan.mechanism)
     program.say("cables    " + formatted("%.1f to %.1f N, clearance at least %.1f cm", r.least_tension_N,
                                          r.greatest_tension_N, 100 * r.least_clearance_m));
-  program.say("picture   " +
-              formatted("%.2f px/mm, sharp from %.2f to %.2f m", sharp.pixels_per_mm, sharp.near_m, sharp.far_m) +
+  program.say("picture   " + formatted("%.2f px/mm, sharp from %.2f m", sharp.pixels_per_mm, sharp.near_m) +
+              (std::isfinite(sharp.far_m) ? formatted(" to %.2f m", sharp.far_m) : " on") +
               formatted(", the object fills %.0f %%", 100 * r.median_fill));
   program.say("motion    " +
               formatted("half a pixel of blur in %.2g s: %.2f mm/s", a.exposure, 1000 * sharp.largest_speed_m_s));
