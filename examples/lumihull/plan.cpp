@@ -3,6 +3,7 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
 #include <lumihull/calib/lens_calibration.h>
+#include <lumihull/capture/experiments.h>
 #include <lumihull/capture/optics.h>
 #include <lumihull/capture/plan_report.h>
 #include <lumihull/capture/planner.h>
@@ -31,7 +32,7 @@ struct Arguments {
   ObjectSize object;
   Optics optics;
   double radius = 0, margin = 0.05, spacing_deg = 0, overlap = 0, tilt_factor = 2.0 / 3, tilt_offset_deg = -30;
-  double bearing_tolerance_deg = 8, settle = 7, exposure = 0.5, clearance = 0.05, travel = -1;
+  double bearing_tolerance_deg = 8, settle = 7, exposure = 0.5, clearance = 0.05, travel = -1, square = 0;
   std::vector<double> center{0, 0, 0};
   Enclosure enclosure;
   int battery = 1000, kicks = 1000;
@@ -106,15 +107,16 @@ HemisphereOptions views_of(const Arguments& a, double radius) {
   return views;
 }
 
-/// The object on its pedestal: from the floor to its top.
+/// The object on its pedestal: from the floor to its top. A sphere ends in the cap; a cylinder's rim lies under one
+/// that is a tenth wider, or under the sphere that holds it all.
 KeepOut keep_out(const Arguments& a, const HemisphereOptions& views, double floor) {
-  const double height = a.object.height_m > 0 ? a.object.height_m : a.object.diameter_m;
-  const double radius = 0.5 * a.object.diameter_m;
+  const double rim = 0.5 * a.object.diameter_m;
   KeepOut object;
-  object.radius_m = radius;
-  object.base = {views.center.x(), views.center.y(), std::min(floor, views.center.z() - 0.5 * height)};
-  // A sphere ends in the cap; a cylinder's flat top lies below one.
-  object.height_m = views.center.z() + (a.object.height_m > 0 ? 0.5 * height : 0) - object.base.z();
+  object.radius_m = a.object.height_m > 0 ? std::min(1.1 * rim, a.object.bounding_radius_m()) : rim;
+  const double cap =
+      a.object.height_m > 0 ? 0.5 * a.object.height_m - std::sqrt(object.radius_m * object.radius_m - rim * rim) : 0;
+  object.base = {views.center.x(), views.center.y(), std::min(floor, views.center.z() - a.object.bounding_radius_m())};
+  object.height_m = views.center.z() + std::max(0.0, cap) - object.base.z();
   return object;
 }
 
@@ -184,8 +186,8 @@ void say(Program& program, const Arguments& a, const PlannedTour& tour, const Pl
   if (tour.plan.mechanism)
     program.say("cables    " + formatted("%.1f to %.1f N, clearance at least %.1f cm", r.least_tension_N,
                                          r.greatest_tension_N, 100 * r.least_clearance_m));
-  program.say("picture   " +
-              formatted("%.2f px/mm, sharp from %.2f to %.2f m", sharp.pixels_per_mm, sharp.near_m, sharp.far_m) +
+  program.say("picture   " + formatted("%.2f px/mm, sharp from %.2f m", sharp.pixels_per_mm, sharp.near_m) +
+              (std::isfinite(sharp.far_m) ? formatted(" to %.2f m", sharp.far_m) : " on") +
               formatted(", the object fills %.0f %%", 100 * r.median_fill));
   program.say("motion    " +
               formatted("half a pixel of blur in %.2g s: %.2f mm/s", a.exposure, 1000 * sharp.largest_speed_m_s));
@@ -262,7 +264,29 @@ void draw(Program& program, const Arguments& a, const Plan& plan) {
   program.say("pictures  " + a.svg);
 }
 
+Mechanism mechanism_of(const Arguments& a) {
+  return a.mechanism == "paper" ? paper_mechanism() : read_mechanism(a.mechanism);
+}
+
+/// How well the robot comes back: no object, no hemisphere.
+void plan_repeatability(Program& program, const Arguments& a) {
+  RepeatabilityOptions options;
+  options.side_m = a.square;
+  options.center = Eigen::Vector3d(a.center[0], a.center[1], a.center[2]);
+  options.settle_s = a.settle, options.exposure_s = a.exposure;
+  options.limits.clearance_m = a.clearance;
+  const Plan plan = repeatability_plan(mechanism_of(a), options);
+  write_plan(plan, a.output);
+  program.say("plan      " + a.output + ": " + std::to_string(plan.stops.size()) + " stops, " +
+              duration(duration_s(plan)));
+  if (!a.svg.empty()) draw(program, a, plan);
+  if (program.json)
+    std::cout << "{\"plan\": " + json_text(a.output) + ", \"stops\": " + std::to_string(plan.stops.size()) +
+                     ", \"total_s\": " + json_number(duration_s(plan)) + "}\n";
+}
+
 void run(Program& program, const Arguments& a) {
+  if (a.square != 0) return plan_repeatability(program, a);
   check(a.object);
   const Optics optics = optics_of(a);
   const bool cables = a.robot == "cables";
@@ -288,7 +312,7 @@ void run(Program& program, const Arguments& a) {
   PlannedTour tour;
   std::optional<Comparison> raster;
   if (cables) {
-    const Mechanism mechanism = a.mechanism == "paper" ? paper_mechanism() : read_mechanism(a.mechanism);
+    const Mechanism mechanism = mechanism_of(a);
     PlannerOptions options;
     options.limits.clearance_m = a.clearance;
     options.object = keep_out(a, views, mechanism.room.min().z());
@@ -330,8 +354,7 @@ void add_plan(Program& program) {
       ->check(CLI::IsMember({"cables", "turntable", "hand"}));
   verb->add_option("--mechanism", a->mechanism, "the cables: a file, or \"paper\" [paper]")->type_name("FILE|paper");
   verb->add_option("--object-diameter", a->object.diameter_m,
-                   "of an upright cylinder, or a sphere, that holds the object, m")
-      ->required();
+                   "of an upright cylinder, or a sphere, that holds the object, m");
   verb->add_option("--object-height", a->object.height_m, "of that cylinder, m; 0: a sphere [0]");
   verb->add_option("--lens", a->optics.focal_length_mm, "focal length, mm [18]");
   verb->add_option("--sensor", a->sensor, "its width x height, mm [22.7x15.1]")->type_name("WxH");
@@ -376,6 +399,8 @@ void add_plan(Program& program) {
   verb->add_option("--target-size", a->enclosure.target_size_m, "m [0.15]");
   verb->add_option("--cameras", a->cameras, "names, one photograph a stop and camera [camera]")->type_name("NAME,…");
   verb->add_option("--battery", a->battery, "pictures until its change; 0: no end [1000]");
+  verb->add_option("--repeatability", a->square,
+                   "in place of views: 25 visits of the corners of a level square of this side about --center, m");
   verb->add_flag("--raster", a->raster, "azimuth by azimuth, from above downwards, as in the paper");
   verb->add_option("--kicks", a->kicks, "how long a shorter way is searched for [1000]");
   verb->add_option("--seed", a->seed, "of search and scatter [1]");

@@ -95,7 +95,7 @@ int main(int argc, char** argv) {
           views.bearing = tolerance < 0 ? Bearing::motor : Bearing::gravity;
           views.bearing_tolerance_rad = std::max(0.0, tolerance) * kDegree;
           PlannerOptions options;
-          options.object = KeepOut{{0, 0, -1}, 0.35, 1.25};
+          options.object = KeepOut{{0, 0, -1}, 0.35, 1.0};
           options.kicks = kicks;
           char bearing[32];
           std::snprintf(bearing, sizeof bearing, tolerance < 0 ? "motor" : "gravity %g", tolerance);

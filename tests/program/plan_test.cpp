@@ -55,6 +55,14 @@ TEST_F(PlanVerb, PlansATurntableAndAHand) {
   }
 }
 
+TEST_F(PlanVerb, PlansVisitsForRepeatability) {
+  const auto run = plan({"--repeatability", "3", "--center", "0,0,1"});
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(capture::read_plan(mine("plan.json")).stops.size(), 100u);
+  EXPECT_EQ(plan({"--repeatability", "-3"}).status, 2);
+  EXPECT_EQ(plan({"--repeatability", "12"}).status, 1);
+}
+
 TEST_F(PlanVerb, SaysWhyNothingIsInReach) {
   const auto run = plan({"--radius", "8"});
   EXPECT_EQ(run.status, 1);

@@ -12,6 +12,7 @@
 #include <map>
 #include <numeric>
 #include <queue>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 
@@ -246,9 +247,14 @@ class Planner {
     std::map<int, std::size_t> photographs;
     for (const Group& group : groups_)
       for (const int i : group.stops) photographs[root(i)] += group.turn < 0 || root(group.turn) == root(i);
-    const int largest = std::max_element(photographs.begin(), photographs.end(), [](const auto& a, const auto& b) {
-                          return a.second < b.second;
-                        })->first;
+    int largest = std::max_element(photographs.begin(), photographs.end(), [](const auto& a, const auto& b) {
+                    return a.second < b.second;
+                  })->first;
+    std::map<int, std::vector<int>> parts;
+    for (int i = 0; i < n; ++i) parts[root(i)].push_back(i);
+    for (const auto& [other, members] : parts)
+      if (other != root(largest) && join(members, parts[largest])) part[std::size_t(root(other))] = root(largest);
+    largest = root(largest);
     std::map<std::string, int> why;
     std::vector<Group> kept;
     for (Group& group : groups_) {
@@ -274,6 +280,36 @@ class Planner {
       tour_.left_out_why.push_back(std::to_string(count) + " stops can't be reached from the others: " + reason);
     groups_ = std::move(kept);
     if (groups_.empty()) throw Error(ErrorCode::degenerate, tour_.left_out_why.back(), mechanism_.name);
+  }
+
+  /// A way round what lies between two parts; the places on it become places that other ways may use.
+  bool join(const std::vector<int>& part, const std::vector<int>& largest) {
+    constexpr std::size_t kTries = 5;
+    std::vector<std::tuple<double, int, int>> pairs;
+    for (const int i : part)
+      for (const int j : largest) pairs.emplace_back(motion_distance(mechanism_, pose(i), pose(j)), i, j);
+    const std::size_t count = std::min(kTries, pairs.size());
+    std::partial_sort(pairs.begin(), pairs.begin() + std::ptrdiff_t(count), pairs.end());
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto [distance, i, j] = pairs[k];
+      const Way found = finder_.find(pose(i), pose(j));
+      if (!found.open) continue;
+      int last = i;
+      for (std::size_t v = 0; v <= found.via.size(); ++v) {
+        int next = j;
+        if (v < found.via.size()) {
+          next = int(stops_.size());
+          stops_.push_back(platform_stop(mechanism_, views_.center, found.via[v], 0));
+          roads_.emplace_back();
+        }
+        const double duration = plan_move(mechanism_, pose(last), pose(next)).duration_s();
+        roads_[std::size_t(last)].emplace_back(next, duration);
+        roads_[std::size_t(next)].emplace_back(last, duration);
+        last = next;
+      }
+      return true;
+    }
+    return false;
   }
 
   /// Straight, round what is in the way, or from stop to stop.
@@ -415,7 +451,7 @@ class Planner {
   Job& job_;
   const KeepOut* object_;
   internal::WayFinder finder_;
-  std::vector<PlannedStop> stops_;  // that are photographed, then where the camera is turned
+  std::vector<PlannedStop> stops_;  // that are photographed, where the camera is turned, places on ways round
   std::vector<Group> groups_;
   std::vector<std::vector<std::pair<int, double>>> roads_;  // open lines to neighbours: to which stop, s
   std::unordered_map<std::uint64_t, double> ways_;          // s
