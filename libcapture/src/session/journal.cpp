@@ -72,7 +72,7 @@ Journal Journal::create(const fs::path& file, const JournalHead& head) {
     throw Error(ErrorCode::invalid_argument, "there is a journal already", file.string());
   if (::ftruncate(descriptor, 0) != 0) fail("can't write", errno, file);
   journal.state_.head = head;
-  journal.state_.shots.resize(head.stops.size() * head.cameras.size());
+  journal.state_.shots = internal::planned_shots(head);
   journal.append({.kind = EventKind::begin});
   sync_folder(file);
   return journal;
@@ -96,18 +96,21 @@ Journal Journal::open(const fs::path& file) {
 
 void Journal::append(JournalEvent event) {
   event.time = now();
-  // Judged on a copy of the little that an event may change would be cheaper; states are small beside a photograph.
-  JournalState next = state_;
   try {
-    internal::apply(next, event, file_.string());
+    internal::apply(state_, event, file_.string());
   } catch (const Error& e) {
     throw Error(ErrorCode::internal, e.message(), file_.string());
   }
   std::string sum = sum_;
   const bool first = event.kind == EventKind::begin;
-  write_line(internal::print_line(event, first ? &state_.head : nullptr, state_.events + 1, sum));
+  try {
+    write_line(internal::print_line(event, first ? &state_.head : nullptr, state_.events, sum));
+  } catch (const Error&) {
+    // What is not on the disk has not happened.
+    if (!broken_ && !first) state_ = internal::parse_journal(read_file(file_, kMostBytes), file_.string()).state;
+    throw;
+  }
   sum_ = std::move(sum);
-  state_ = std::move(next);
 }
 
 void Journal::write_line(const std::string& line) {

@@ -76,6 +76,8 @@ JournalHead read_head(const JsonReader& json) {
   head.name_template = json.at("names").string();
   head.stops = read_names(json.at("stops"));
   head.cameras = read_names(json.at("cameras"));
+  if (json.has("passed"))
+    for (const std::string& name : read_names(json.at("passed"))) head.passed.insert(name);
   return head;
 }
 
@@ -122,6 +124,7 @@ std::string print_line(const JournalEvent& e, const JournalHead* head, std::size
     json["names"] = head->name_template;
     json["cameras"] = head->cameras;
     json["stops"] = head->stops;
+    if (!head->passed.empty()) json["passed"] = head->passed;
   }
   const Fields has = fields_of(e.kind);
   if (has.stop) json["stop"] = e.stop;
@@ -179,13 +182,22 @@ ParsedJournal parse_journal(std::string_view text, const std::string& file) {
       } catch (const Error& e) {
         throw Error(ErrorCode::bad_input, e.message(), where);
       }
-      out.state.shots.resize(out.state.head.stops.size() * out.state.head.cameras.size());
+      out.state.shots = planned_shots(out.state.head);
     }
     apply(out.state, event, where);
     out.sum = sum;
     out.length = end + 1;
   }
   return out;
+}
+
+std::vector<ShotProgress> planned_shots(const JournalHead& head) {
+  std::vector<ShotProgress> shots;
+  shots.reserve(head.stops.size() * head.cameras.size());
+  for (const std::string& stop : head.stops)
+    for (std::size_t c = 0; c < head.cameras.size(); ++c)
+      shots.push_back({.step = head.passed.contains(stop) ? ShotStep::none : ShotStep::waiting});
+  return shots;
 }
 
 void check(const JournalHead& head) {
@@ -198,6 +210,10 @@ void check(const JournalHead& head) {
         throw Error(ErrorCode::invalid_argument,
                     std::string("expected a name that no other ") + what + " has, found \"" + name + "\"", "journal");
   }
+  const std::set<std::string_view> stops(head.stops.begin(), head.stops.end());
+  for (const std::string& name : head.passed)
+    if (!stops.contains(name))
+      throw Error(ErrorCode::invalid_argument, "expected a stop's name, found \"" + name + "\"", "journal");
   if (head.stops.size() > 1'000'000 || head.cameras.size() > 64)
     throw Error(ErrorCode::invalid_argument, "expected at most a million stops and 64 cameras", "journal");
 }

@@ -25,6 +25,9 @@ struct ParsedJournal {
 /// Errors: bad_input.
 LUMIHULL_API ParsedJournal parse_journal(std::string_view text, const std::string& file);
 
+/// Every photograph waiting.
+std::vector<ShotProgress> planned_shots(const JournalHead& head);
+
 /// Error{invalid_argument}: no stops or cameras, names empty or used twice.
 void check(const JournalHead& head);
 

@@ -56,6 +56,7 @@ class Applier {
       case EventKind::arrived:
         if (state_.at_stop != stop()) fail("\"moving\" to this stop before");
         state_.moving = false;
+        state_.arrived_at = state_.at_stop;
         break;
       case EventKind::firing:
         firing();

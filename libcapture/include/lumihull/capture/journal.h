@@ -22,7 +22,7 @@ enum class EventKind : std::uint8_t {
   consent,   ///< the operator was asked, and answered
   moving,    ///< to a stop; written before the robot is told
   arrived,   ///< at the stop
-  declared,  ///< the operator said that the platform is at this stop
+  declared,  ///< the operator, or the robot's own cable lengths, said that the platform is at this stop
   firing,    ///< written before the shutter is asked
   done,      ///< one exposure was made
   refused,   ///< none was made
@@ -55,10 +55,12 @@ struct JournalHead {
   std::string plan_sha256;    ///< of plan.json in the capture's folder
   std::string name_template;  ///< of photographs' names
   std::vector<std::string> stops, cameras;
+  std::set<std::string> passed;  ///< of the stops: those where nothing is photographed
 };
 
 /// Where a photograph stands.
 enum class ShotStep : std::uint8_t {
+  none,     ///< nothing is photographed at this stop
   waiting,  ///< not asked for yet, or to be taken (again)
   firing,   ///< the shutter was asked, no answer yet; of a killed session: in doubt
   refused,  ///< asked for, surely not taken
@@ -94,8 +96,9 @@ struct JournalState {
   std::map<ShotId, std::size_t> by_id;
   std::set<std::string> files;      ///< every name that was ever given
   ShotId last_id = 0;
-  std::optional<std::size_t> at_stop;  ///< where the robot is, or was last sent to
-  bool moving = false;                 ///< sent there, not arrived
+  std::optional<std::size_t> at_stop;     ///< where the robot is, or was last sent to
+  std::optional<std::size_t> arrived_at;  ///< where it last was for certain
+  bool moving = false;                    ///< sent to at_stop, not arrived
   std::size_t sessions = 0, events = 0;
   EventKind last = EventKind::begin;
   std::string last_time;
