@@ -39,7 +39,7 @@ struct Tensions {
   /// Where there is a choice (more than six cables, or singular) the t of least norm within the limits, or, where none
   /// is within them, the t >= 0 of least norm; if unbalanced the t >= 0 of the least residual.
   CableVector tension_N;
-  double residual_N = 0;  ///< |W t + r|, torques divided by the characteristic length
+  double residual_N = 0;         ///< |W t + r|, torques divided by the characteristic length
   double smallest_singular = 0;  ///< of W with torques divided by the characteristic length; 0 … sqrt(cables)
 };
 
