@@ -47,10 +47,9 @@ struct PoseJudgement {
 LUMIHULL_API PoseJudgement judge_pose(const Mechanism& mechanism, const Pose& world_from_platform,
                                       const KeepOut* object, const PoseLimits& limits = {});
 
-/// In words, the commonest first: "cable 3 would be slack at 120 of 240 stops (0.21 N, at least 1 N)". Empty where all
-/// are well.
-LUMIHULL_API std::vector<std::string> obstacles_in_words(const Mechanism& mechanism,
-                                                         std::span<const PoseJudgement> judgements);
+/// In words, the commonest first: "at 120 of 240 stops, as: cable 3 would be slack: 0.21 N, at least 1 N". Empty where
+/// all are well.
+LUMIHULL_API std::vector<std::string> obstacles_in_words(std::span<const PoseJudgement> judgements);
 
 struct PlannerOptions {
   PoseLimits limits;
@@ -94,7 +93,8 @@ LUMIHULL_API PlannedTour plan_tour(const Mechanism& mechanism, const HemisphereO
                                    const PlannerOptions& options, Job& job);
 
 /// The paper's order (2.2): each azimuth from the zenith to the horizon, then back up; the camera is turned at each
-/// lowest place. Same ways, same checks; `views.bearing_tolerance_rad` is not used.
+/// lowest place. Same ways, same checks. Azimuths don't share bearings but where `thin` leaves rows without common
+/// azimuths: there each stop belongs to the equator's nearest one.
 LUMIHULL_API PlannedTour raster_tour(const Mechanism& mechanism, const HemisphereOptions& views,
                                      const PlannerOptions& options, Job& job);
 
