@@ -127,7 +127,7 @@ ShotOutcome SimulatedCamera::shoot(ShotId id, double exposure_s, const fs::path&
     out.write(bytes.data(), std::streamsize(bytes.size() / 2)).flush();
     pass(exposure_s * options_.time_scale / 2, job);
     out.write(bytes.data() + bytes.size() / 2, std::streamsize(bytes.size() - bytes.size() / 2)).flush();
-    if (!out) return {.state = ShotState::unknown, .detail = "the download failed"};
+    if (!out) return {ShotState::unknown, {}, "the download failed"};
   }
   if (afterwards)
     if (const auto outcome = afterwards(id)) return *outcome;
@@ -135,7 +135,7 @@ ShotOutcome SimulatedCamera::shoot(ShotId id, double exposure_s, const fs::path&
 }
 
 ShotOutcome SimulatedCamera::recall(ShotId id) {
-  if (!options_.recalls) return {.detail = "this camera keeps no list"};
+  if (!options_.recalls) return {ShotState::unknown, {}, "this camera keeps no list"};
   std::ifstream in(options_.list);
   std::string line;
   while (std::getline(in, line)) {
@@ -146,7 +146,7 @@ ShotOutcome SimulatedCamera::recall(ShotId id) {
     if (options_.delivers) write_file(path, picture(id, stop));  // from its card, once more
     return {.state = ShotState::done, .file = options_.delivers ? fs::path(path) : fs::path(), .detail = {}};
   }
-  return {.state = ShotState::refused, .detail = "not on the camera's list"};
+  return {ShotState::refused, {}, "not on the camera's list"};
 }
 
 }  // namespace lumihull::rig

@@ -5,8 +5,7 @@
 #include <lumihull/capture/session.h>
 #include <unistd.h>
 
-#include <cmath>
-#include <cstdio>
+#include <algorithm>
 #include <system_error>
 
 #include "photographs.h"

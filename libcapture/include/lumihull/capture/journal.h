@@ -37,17 +37,17 @@ enum class EventKind : std::uint8_t {
 /// One line. Which members count depends on the kind; the others are left as they are here.
 struct JournalEvent {
   EventKind kind = EventKind::session;
-  std::string time;                  ///< ISO 8601, UTC, milliseconds; set by `append`
-  std::string stop;                  ///< moving, arrived, declared, firing, retake
-  std::string camera;                ///< firing
+  std::string time{};                  ///< ISO 8601, UTC, milliseconds; set by `append`
+  std::string stop{};                  ///< moving, arrived, declared, firing, retake
+  std::string camera{};                ///< firing
   ShotId shot = 0;                   ///< firing, done, refused, unknown, decided, file
   double settle_s = 0;               ///< firing
   double exposure_s = 0;             ///< firing
-  std::vector<double> lengths_m;     ///< firing: of the cables, as commanded
-  std::string file, sha256;          ///< file: its name in photos/
+  std::vector<double> lengths_m{};     ///< firing: of the cables, as commanded
+  std::string file{}, sha256{};          ///< file: its name in photos/
   std::uint64_t size = 0;            ///< file
-  std::string answer;                ///< consent, decided
-  std::string text;                  ///< session, consent (the question), refused, unknown, retake, fault, stopped
+  std::string answer{};                ///< consent, decided
+  std::string text{};                  ///< session, consent (the question), refused, unknown, retake, fault, stopped
 };
 
 /// What the first line says.
@@ -84,9 +84,9 @@ struct Take {
 /// One photograph of the plan: a stop and a camera.
 struct ShotProgress {
   ShotStep step = ShotStep::waiting;
-  Take take;                 ///< the latest; shot = 0 before the first
-  std::vector<Take> landed;  ///< all whose files landed, oldest first; the newest is the view
-  std::string detail;        ///< why, for refused and unknown
+  Take take{};                 ///< the latest; shot = 0 before the first
+  std::vector<Take> landed{};///< all whose files landed, oldest first; the newest is the view
+  std::string detail{};        ///< why, for refused and unknown
 };
 
 /// What all lines together say.
