@@ -20,6 +20,11 @@ inline void need_usable(const Mechanism& mechanism, const Pose& pose) {
     throw Error(ErrorCode::invalid_argument, "expected a finite pose of the platform", mechanism.name);
 }
 
+/// Cables of one point: they can't cross there.
+inline bool same_point(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return (a - b).squaredNorm() < kShortest_m * kShortest_m;
+}
+
 [[noreturn]] inline void fail_without_direction(const Cable& cable) {
   throw Error(ErrorCode::degenerate, "the cable has no length at this pose", "cable " + cable.name);
 }
