@@ -219,14 +219,18 @@ class Session {
     } else if (robot.position_known && (at_ = internal::stop_of_lengths(plan_, robot.lengths_m))) {
       if (state().at_stop != at_ || state().moving)
         journal_.append({.kind = EventKind::declared, .stop = plan_.stops[*at_].name});
-    } else {
-      declare(next);
+    } else if (robot.position_known && state().at_stop) {
+      const std::size_t to = *state().at_stop, from = state().arrived_at.value_or(to);
+      between_ = internal::pose_between(plan_, from, to, robot.lengths_m);
     }
+    if (plan_.mechanism && !at_ && !between_) declare(next);
     keep_out_first_ = begun;
     char text[240];
     std::snprintf(text, sizeof text, "%s: %zu photographs to take, about %.0f min. The robot will move%s%s; first to ",
-                  begun ? "go on" : "begin", left(), std::ceil(planned_seconds_left() / 60), at_ ? " from " : "",
-                  at_ ? plan_.stops[*at_].name.c_str() : "");
+                  begun ? "go on" : "begin", left(), std::ceil(planned_seconds_left() / 60), at_ || between_ ? " from " : "",
+                  at_        ? plan_.stops[*at_].name.c_str()
+                  : between_ ? "a place between two stops"
+                             : "");
     ask({Question::About::motion, text + plan_.stops[next].name + ". Is the way free?", {"move", "stop"}});
   }
 
@@ -265,10 +269,11 @@ class Session {
     // The plan's own ways were checked: they are taken where nothing but places to pass lies in between.
     bool as_planned = at_ == stop || !plan_.mechanism || (at_ && *at_ < stop && !keep_out_first_);
     for (std::size_t i = at_.value_or(stop) + 1; i < stop; ++i) as_planned &= !plan_.stops[i].photograph;
-    if (!plan_.mechanism || !as_planned) {
-      go(plan_.mechanism ? internal::way_out(plan_, plan_.stops[at_.value()].world_from_platform, plan_.stops[stop])
-                         : std::vector{plan_.stops[stop]},
-         stop);
+    if (!plan_.mechanism) {
+      go({plan_.stops[stop]}, stop);
+    } else if (!as_planned) {
+      const Pose& from = at_ ? plan_.stops[*at_].world_from_platform : between_.value();
+      go(internal::way_out(plan_, from, plan_.stops[stop]), stop);
     } else {
       const std::size_t from = *at_;
       for (std::size_t i = std::min(from + 1, stop); i <= stop; ++i) go({plan_.stops[i]}, i);
@@ -409,6 +414,7 @@ class Session {
   internal::ContactSheet sheet_;
   SessionResult result_;
   std::optional<std::size_t> at_;  ///< the stop where the robot is
+  std::optional<Pose> between_;    ///< where it is, if at no stop
   std::optional<double> roll_rad_;
   bool keep_out_first_ = false;  ///< after a restart: the first way leads straight up
   double planned_at_start_ = 0;

@@ -2,6 +2,7 @@
 
 #include <lumihull/base/error.h>
 #include <lumihull/capture/clearance.h>
+#include <lumihull/capture/forward.h>
 #include <lumihull/capture/planner.h>
 #include <lumihull/capture/statics.h>
 
@@ -83,6 +84,20 @@ std::vector<PlannedStop> way_out(const Plan& plan, const Pose& from, const Plann
     way.push_back(i + 1 < poses.size() ? passing(plan, poses[i], to) : to);
   }
   return way;
+}
+
+std::optional<Pose> pose_between(const Plan& plan, std::size_t from, std::size_t to,
+                                 const std::vector<double>& lengths_m) {
+  if (lengths_m.size() != plan.mechanism->cables.size()) return std::nullopt;
+  const Pose start = between(plan.stops[from].world_from_platform, plan.stops[to].world_from_platform, 0.5);
+  try {
+    const Hanging hanging = hang_rigid(*plan.mechanism, lengths_m, start);
+    // Cables that sag leave open where the platform really is.
+    return hanging.taut ? std::optional(hanging.world_from_platform) : std::nullopt;
+  } catch (const Error& e) {
+    if (e.code() != ErrorCode::degenerate && e.code() != ErrorCode::invalid_argument) throw;
+    return std::nullopt;
+  }
 }
 
 std::optional<std::size_t> stop_of_lengths(const Plan& plan, const std::vector<double>& lengths_m) {

@@ -90,7 +90,7 @@ struct ShotProgress {
 };
 
 /// What all lines together say.
-struct JournalState {
+struct LUMIHULL_API JournalState {
   JournalHead head;
   std::vector<ShotProgress> shots;  ///< head.stops.size() x head.cameras.size(), a stop's cameras side by side
   std::map<ShotId, std::size_t> by_id;
