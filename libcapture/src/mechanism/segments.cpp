@@ -1,5 +1,6 @@
 #include "segments.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 

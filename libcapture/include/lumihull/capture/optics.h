@@ -23,7 +23,7 @@ struct Optics {
 LUMIHULL_API void check(const Optics& optics);
 
 /// An upright cylinder about the centre of the views that holds the object; a sphere where height_m is 0.
-struct ObjectSize {
+struct LUMIHULL_API ObjectSize {
   double diameter_m = 0;
   double height_m = 0;
 

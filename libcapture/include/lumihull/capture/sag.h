@@ -11,7 +11,7 @@ namespace lumihull::capture {
 ///     z = (V L0 + w L0² / 2) / EA + (T1 - T0) / w,      T0² = H² + V²,  T1² = H² + (V + w L0)²
 ///
 /// with w = density x gravity. Source: Irvine 1981, ch. 1; the formulas hold for w = 0 and EA = infinite, too.
-struct HangingCable {
+struct LUMIHULL_API HangingCable {
   double length_m = 0;       ///< L0, unstrained
   double pull_N = 0;         ///< H >= 0
   double lift_N = 0;         ///< V, any sign: a slack cable hangs below the platform and pulls it down
