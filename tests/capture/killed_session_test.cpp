@@ -19,9 +19,8 @@ namespace fs = std::filesystem;
 using About = Question::About;
 
 struct Kills {
-  int kills = 0;     ///< processes that were killed
-  int doubts = 0;    ///< shots that were decided by the operator
-  int resumed = 0;   ///< sessions that the journal knows
+  int kills = 0;    ///< processes that were killed
+  int resumed = 0;  ///< sessions that the journal knows
 };
 
 /// Runs the scene in child processes, each killed after a random time, until `kills` were; then to its end.
@@ -75,19 +74,30 @@ void expect_planned_order(const test::Scene& scene, const std::string& camera) {
   }
 }
 
+/// Where synchronising costs nothing, kills fall into all that happens, not only into waiting for the disk.
+struct MemoryFolder {
+  fs::path path = fs::exists("/dev/shm") ? "/dev/shm" : fs::temp_directory_path();
+  MemoryFolder() {
+    std::string name = (path / "lumihull-killed-XXXXXX").string();
+    if (mkdtemp(name.data())) path = name;
+  }
+  ~MemoryFolder() { fs::remove_all(path); }
+};
+
 class Killed : public testing::TestWithParam<bool> {};
 
 TEST_P(Killed, At200Moments) {
   const bool recalls = GetParam();
-  const test::TemporaryFolder folder;
-  int kills = 0, sessions = 0;
-  std::size_t twice = 0, shots = 0;
+  const MemoryFolder folder;
+  int kills = 0, sessions = 0, captures = 0;
+  std::size_t twice = 0, shots = 0, doubts = 0;
   const auto start = std::chrono::steady_clock::now();
-  for (std::uint32_t run = 0; run < 2; ++run) {
-    test::Scene scene(folder / std::to_string(run), test::turntable_plan(150, {"left", "right"}));
+  for (std::uint32_t run = 0; kills < 100; ++run) {
+    test::Scene scene(folder.path / std::to_string(run), test::turntable_plan(150, {"left", "right"}));
     scene.recalls = recalls;
-    scene.options.page_every_s = 0.05;
-    const Kills killed = run_killed(scene, 50, 0.15, 17 * run + recalls);
+    scene.options.page_every_s = 0.2;
+    for (PlannedStop& stop : scene.plan.stops) stop.exposure_s = 0.004;
+    const Kills killed = run_killed(scene, std::min(40, 100 - kills), 0.15, 17 * run + recalls);
     kills += killed.kills;
     sessions += killed.resumed;
     scene.expect_complete();
@@ -98,6 +108,7 @@ TEST_P(Killed, At200Moments) {
       twice += exposed - 150;
       shots += 150;
     }
+    ++captures;
     // Each exposure beyond the planned is one that was in doubt, and that the operator let be made again.
     std::size_t decided = 0;
     std::ifstream journal(journal_path(scene.folder));
@@ -105,6 +116,7 @@ TEST_P(Killed, At200Moments) {
     std::size_t extra = 0;
     for (const std::string camera : {"left", "right"}) extra += scene.exposures(camera).size() - 150;
     EXPECT_LE(extra, decided);
+    doubts += decided;
     if (recalls) {
       EXPECT_EQ(decided, 0u);
     }
@@ -113,20 +125,61 @@ TEST_P(Killed, At200Moments) {
   if (recalls) {
     EXPECT_EQ(twice, 0u);
   }
-  std::printf("%d kills, %zu shots, %d sessions begun, %zu exposures made again after a doubt, %.0f s\n", kills, shots,
-              sessions, twice,
+  std::printf("%d kills in %d captures of %zu photographs in all, %d sessions begun, %zu doubts, %zu exposures made again, "
+              "%.0f s\n",
+              kills, captures, shots, sessions, doubts, twice,
               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
 }
 
 INSTANTIATE_TEST_SUITE_P(Camera, Killed, testing::Values(true, false),
                          [](const auto& camera) { return std::string(camera.param ? "ThatRecalls" : "WithoutMemory"); });
 
+/// Not at random: by the devices themselves, in the midst of their work.
+TEST(KilledAt, EachStepOfAShot) {
+  for (const bool recalls : {true, false})
+    for (const std::string moment : {"moving", "before the exposure", "half of the file", "after the file"}) {
+      SCOPED_TRACE(moment + (recalls ? ", recalling" : ""));
+      const MemoryFolder folder;
+      test::Scene scene(folder.path, test::turntable_plan(6, {"left", "right"}));
+      scene.recalls = recalls;
+      const pid_t child = fork();
+      if (child == 0) {
+        scene.prepare = [&](rig::SimulatedRobot& robot, const std::vector<rig::SimulatedCamera*>& cameras) {
+          const auto die_at = [](ShotId id) {
+            if (id == 6) raise(SIGKILL);
+          };
+          const auto fault = [die_at](ShotId id) -> std::optional<ShotOutcome> { return die_at(id), std::nullopt; };
+          if (moment == "moving")
+            robot.on_move = [](const PlannedStop& stop) {
+              if (stop.name == "a003-e00") raise(SIGKILL);
+            };
+          if (moment == "before the exposure") cameras[1]->instead = fault;
+          if (moment == "half of the file") cameras[1]->halfway = die_at;
+          if (moment == "after the file") cameras[1]->afterwards = fault;
+        };
+        scene.run();
+        _exit(0);
+      }
+      int status = 0;
+      waitpid(child, &status, 0);
+      ASSERT_TRUE(WIFSIGNALED(status));
+      scene.who.answers[About::doubt] = {"again"};
+      scene.run();
+      scene.expect_complete();
+      // In doubt is only what left neither a word nor a whole file.
+      const bool doubt = !recalls && (moment == "before the exposure" || moment == "half of the file");
+      EXPECT_EQ(scene.who.count(About::doubt), doubt ? 1u : 0u);
+      EXPECT_EQ(scene.exposures("right").size(), doubt && moment == "half of the file" ? 7u : 6u);
+      EXPECT_EQ(scene.exposures("left").size(), 6u);
+    }
+}
+
 TEST(KilledCables, ACablesRobotGoesOnFromBetweenTwoStops) {
   const test::TemporaryFolder folder;
   test::Scene scene(folder.path(), test::cable_plan(6, 3));
   for (PlannedStop& stop : scene.plan.stops) stop.travel_s = 0.02;
   scene.who.answers[About::position] = {scene.plan.stops[0].name};
-  const Kills killed = run_killed(scene, 12, 0.2, 5);
+  const Kills killed = run_killed(scene, 12, 0.3, 5);
   EXPECT_EQ(killed.kills, 12);
   scene.expect_complete();
   expect_planned_order(scene, "main");

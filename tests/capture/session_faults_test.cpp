@@ -291,9 +291,8 @@ TEST(SessionFaults, AReadOnlyFolderIsToldBeforeAnythingMoves) {
   const test::TemporaryFolder folder;
   test::Scene scene(folder.path(), test::turntable_plan(3));
   fs::create_directories(scene.folder);
-  fs::permissions(folder.path(), fs::perms::others_all, fs::perm_options::add);
-  fs::permissions(scene.folder, fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_read |
-                                    fs::perms::others_exec);
+  fs::permissions(folder.path(), fs::perms::all, fs::perm_options::add);
+  fs::permissions(scene.folder, fs::perms(0555));
   const bool root = geteuid() == 0;
   if (root && seteuid(65534) != 0) GTEST_SKIP() << "root may write anywhere, and can't leave its rights";
   const Error e = test::expect_error([&] { scene.run(); });

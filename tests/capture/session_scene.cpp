@@ -38,16 +38,29 @@ Plan turntable_plan(int stops, std::vector<std::string> cameras) {
   return plan;
 }
 
+/// Three pairs of cables far apart: stiff enough all over the hemisphere, and no two of them can meet.
+Mechanism wide_mechanism() {
+  Mechanism mechanism = paper_mechanism();
+  for (int i = 0; i < 6; ++i) {
+    const double at = 2 * std::numbers::pi / 3 * (i / 2), from = at + (i % 2 ? 1 : -1);
+    mechanism.cables[std::size_t(i)].attachment = {0.25 * std::cos(at), 0.25 * std::sin(at), 0};
+    mechanism.cables[std::size_t(i)].departure = {4.5 * std::cos(from), 4.5 * std::sin(from), mechanism.room.max().z()};
+  }
+  return mechanism;
+}
+
 Plan cable_plan(int azimuths, int rows) {
   Plan plan;
   plan.robot = "cables";
   plan.cameras = {"main"};
-  plan.mechanism = paper_mechanism();
+  plan.mechanism = wide_mechanism();
   HemisphereOptions views;
   views.azimuths = azimuths;
   views.rows = rows;
   views.phi_from_rad = 0.3;
   views.phi_to_rad = 1.2;
+  views.tilt_factor = 1.0 / 3;
+  views.tilt_offset_rad = -std::numbers::pi / 12;
   views.bearing = Bearing::fixed;
   plan.stops = hemisphere_stops(*plan.mechanism, views);
   plan.object = KeepOut{{0, 0, -0.5}, 0.25, 0.5};

@@ -15,7 +15,7 @@
 
 namespace lumihull::test {
 
-/// Stops around a turntable, or of the paper's mechanism above an object; times are milliseconds.
+/// Stops around a turntable, or of a mechanism of six cables around an object; times are milliseconds.
 capture::Plan turntable_plan(int stops, std::vector<std::string> cameras = {"main"});
 capture::Plan cable_plan(int azimuths, int rows);
 

@@ -125,6 +125,7 @@ ShotOutcome SimulatedCamera::shoot(ShotId id, double exposure_s, const fs::path&
     // As a download comes in: a killed program leaves half of it.
     std::ofstream out(place, std::ios::binary);
     out.write(bytes.data(), std::streamsize(bytes.size() / 2)).flush();
+    if (halfway) halfway(id);
     pass(exposure_s * options_.time_scale / 2, job);
     out.write(bytes.data() + bytes.size() / 2, std::streamsize(bytes.size() - bytes.size() / 2)).flush();
     if (!out) return {ShotState::unknown, {}, "the download failed"};

@@ -1,5 +1,6 @@
 // Everything that can be checked before anything moves.
 
+#include <fcntl.h>
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
 #include <lumihull/capture/session.h>
@@ -99,7 +100,7 @@ class Checks {
     std::error_code error;
     while (!fs::exists(existing, error) && existing.has_relative_path()) existing = existing.parent_path();
     if (!fs::is_directory(existing, error)) return problem(existing.string() + ": a file is in the way of the folder");
-    if (::access(existing.c_str(), W_OK | X_OK) != 0) problem(existing.string() + ": the folder can't be written to");
+    if (::faccessat(AT_FDCWD, existing.c_str(), W_OK | X_OK, AT_EACCESS) != 0) problem(existing.string() + ": the folder can't be written to");
 
     std::optional<JournalState> state;
     attempt([&] { state = internal::stored_state(folder_, plan_); });

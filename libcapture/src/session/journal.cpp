@@ -39,6 +39,13 @@ std::string now() {
   return text;
 }
 
+/// Devices' and operators' words may be anything; the journal takes what can be read back: as Error has it, UTF-8 on one
+/// line.
+std::string printable(const std::string& text) {
+  constexpr std::size_t kMost = 4000;
+  return Error(ErrorCode::internal, text.substr(0, kMost)).message();
+}
+
 void sync_folder(const fs::path& file) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -96,6 +103,8 @@ Journal Journal::open(const fs::path& file) {
 
 void Journal::append(JournalEvent event) {
   event.time = now();
+  event.text = printable(event.text);
+  event.answer = printable(event.answer);
   try {
     internal::apply(state_, event, file_.string());
   } catch (const Error& e) {

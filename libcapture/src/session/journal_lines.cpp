@@ -141,8 +141,7 @@ std::string print_line(const JournalEvent& e, const JournalHead* head, std::size
     json["sha256"] = e.sha256;
   }
   if (has.answer) json["answer"] = e.answer;
-  if (has.text) json["text"] = e.text.substr(0, kMostText);
-  // Devices' words may be anything: a byte that is no UTF-8 must not stop the capture.
+  if (has.text) json["text"] = e.text;
   std::string line = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   line.pop_back();
   sum = sum_of(sum, line);

@@ -121,9 +121,9 @@ std::vector<std::string> photograph_names(const JournalHead& head) {
       }
       const std::string name = expand(head, stop, camera), title = head.stops[stop] + ", " + head.cameras[camera];
       if (name.empty() || name.size() > 180 || name.front() == '.' || name.find('/') != std::string::npos ||
-          like_a_retake(name))
+          Error(ErrorCode::internal, name).message() != name || like_a_retake(name))
         throw Error(ErrorCode::bad_input,
-                    "expected plain file names that don't begin with '.' or end in ~ and a number, found \"" + name + "\"",
+                    "expected plain file names in UTF-8 that don't begin with '.' or end in ~ and a number, found \"" + name + "\"",
                     text);
       if (const auto [other, is_new] = taken.emplace(name, title); !is_new)
         throw Error(ErrorCode::bad_input,
@@ -199,7 +199,10 @@ std::string land_photograph(Journal& journal, const fs::path& folder, ShotId id,
 
   std::string name = photograph_names(state.head)[found->second];
   if (!shot.landed.empty()) name += "~" + std::to_string(shot.landed.size() + 1);
-  name += file.extension().string();
+  const std::string extension = file.extension().string();
+  const auto plain = [](unsigned char c) { return std::isalnum(c); };
+  if (extension.size() > 1 && extension.size() < 12 && std::all_of(extension.begin() + 1, extension.end(), plain))
+    name += extension;
   const fs::path place = folder / "photos" / name;
   make_folder(place.parent_path());
   if (fs::exists(fs::symlink_status(place, error)))

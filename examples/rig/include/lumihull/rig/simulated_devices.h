@@ -65,6 +65,7 @@ class SimulatedCamera : public capture::CameraDevice {
 
   /// A test's faults: an outcome in place of the exposure; an outcome told in place of the real one.
   std::function<std::optional<capture::ShotOutcome>(capture::ShotId)> instead, afterwards;
+  std::function<void(capture::ShotId)> halfway;  ///< called when half of the file is there
 
  private:
   std::string picture(capture::ShotId id, const std::string& stop) const;
