@@ -1,6 +1,8 @@
 // A capture that is killed again and again: nothing is lost, nothing is there twice, the order is the plan's.
 
+#include <fcntl.h>
 #include <lumihull/base/files.h>
+#include <poll.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -29,10 +31,15 @@ Kills run_killed(test::Scene& scene, int kills, double longest_s, std::uint32_t 
   std::mt19937 random(seed);
   Kills out;
   for (;;) {
+    int moved[2];
+    if (pipe2(moved, O_CLOEXEC) != 0) return out;
     const pid_t child = fork();
     if (child == 0) {
       int status = 1;
       try {
+        scene.prepare = [&](rig::SimulatedRobot& robot, const std::vector<rig::SimulatedCamera*>&) {
+          robot.on_move = [&](const PlannedStop&) { (void)!write(moved[1], "m", 1); };
+        };
         scene.who.answers[About::doubt] = {"again"};
         scene.run();
         status = 0;
@@ -41,13 +48,18 @@ Kills run_killed(test::Scene& scene, int kills, double longest_s, std::uint32_t 
       }
       _exit(status);
     }
+    close(moved[1]);
     if (out.kills < kills) {
+      // Every second one while it photographs, however long a process takes to begin.
+      pollfd first{moved[0], POLLIN, 0};
+      if (out.kills % 2) poll(&first, 1, 20000);
       const double after = std::uniform_real_distribution<double>(0, longest_s)(random);
       std::this_thread::sleep_for(std::chrono::duration<double>(after));
       ::kill(child, SIGKILL);
     }
     int status = 0;
     waitpid(child, &status, 0);
+    close(moved[0]);
     if (WIFSIGNALED(status)) {
       ++out.kills;
       continue;
