@@ -94,6 +94,7 @@ Scene::Scene(const fs::path& place, Plan p) : folder(place / "object"), memory(p
 SessionResult Scene::run(Job* job) {
   Job own;
   rig::SimulatedRobot robot({.time_scale = 1,
+                             .turn_s = 0.001,
                              .memory = robot_remembers ? memory / "robot" : fs::path(),
                              .starts_anywhere = !plan.mechanism});
   robot.on_move = [&](const PlannedStop& stop) {

@@ -89,7 +89,7 @@ void SimulatedRobot::move_to(const PlannedStop& stop, Job& job) {
 
 void SimulatedRobot::set_roll(double roll_rad, Job& job) {
   if (on_roll) on_roll(roll_rad);
-  pass(options_.time_scale, job);
+  pass(options_.turn_s * options_.time_scale, job);
 }
 
 void SimulatedRobot::declare_position(const PlannedStop& stop) { remember(stop.lengths_m, stop.name); }

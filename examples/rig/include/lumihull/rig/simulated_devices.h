@@ -14,6 +14,7 @@ class SimulatedRobot : public capture::Robot {
  public:
   struct Options {
     double time_scale = 0.02;      ///< seconds for a second of the plan's travel
+    double turn_s = 2;             ///< of the camera in its bearing, before scaling
     std::filesystem::path memory;  ///< cable lengths, the stop's name; empty: forgotten with the program
     bool starts_anywhere = true;   ///< without memory the position is known all the same: at the first stop moved to
   };
