@@ -4,14 +4,13 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/export.h>
 #include <lumihull/base/files.h>
+#include <lumihull/internal/child_process.h>
 
 #include <algorithm>
 #include <cstdlib>
 #include <deque>
 #include <fstream>
 #include <sstream>
-
-#include "child_process.h"
 
 namespace lumihull::calib {
 namespace {
@@ -57,7 +56,7 @@ class Step {
     job_.begin(stage, total);
     int status = 0;
     try {
-      status = run_child(command, job_, [&](const std::string& line) {
+      status = internal::run_child(command, job_, [&](const std::string& line) {
         log_ << line << "\n";
         if (line.find_first_not_of(" \t\r=") == std::string::npos) return;
         last.push_back(line);
@@ -122,8 +121,7 @@ fs::path ColmapRun::model(Job& job) const {
                                    threads};
   if (known_camera) {
     const auto [name, parameters] = words_of(*known_camera);
-    extract.insert(extract.end(),
-                   {"--ImageReader.camera_model", name, "--ImageReader.camera_params", parameters});
+    extract.insert(extract.end(), {"--ImageReader.camera_model", name, "--ImageReader.camera_params", parameters});
   }
   step("finding features", photo_count, extract,
        [](const std::string& line) { return number_behind(line, "Processed file ["); });
@@ -143,8 +141,8 @@ fs::path ColmapRun::model(Job& job) const {
          return photo_count * ++blocks / (side * side);
        });
 
-  std::vector<std::string> map{"mapper",    "--database_path", database,
-                               "--image_path", photos.string(),   "--output_path",
+  std::vector<std::string> map{"mapper",        "--database_path",      database,
+                               "--image_path",  photos.string(),        "--output_path",
                                models.string(), "--Mapper.num_threads", threads};
   if (known_camera)
     for (const char* flag : {"--Mapper.ba_refine_focal_length", "--Mapper.ba_refine_extra_params"})
@@ -164,7 +162,8 @@ fs::path ColmapRun::model(Job& job) const {
     throw Error(ErrorCode::degenerate,
                 "COLMAP found no two photographs that show enough of the same: too plain or shiny, too far from "
                 "one another, or without parallax; its words are in " +
-                    (work / "colmap.log").string() + ". Printed targets beside the object help: see `lumihull targets`");
+                    (work / "colmap.log").string() +
+                    ". Printed targets beside the object help: see `lumihull targets`");
   return best;
 }
 
