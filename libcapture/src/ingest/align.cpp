@@ -63,20 +63,20 @@ std::vector<std::size_t> order_of_times(std::span<const CardPicture> pictures) {
   return order;
 }
 
-/// Counters tell the order, except where a counter was reset; times tell it, except where a clock was set back. What
+/// Counters tell the order and the clock may have been set; or a counter was reset, and times tell the order. What
 /// explains more is believed, what only one of two equals says is left open.
 Verdict best_order(std::span<const ExpectedShot> shots, std::span<const CardPicture> pictures,
                    const AlignOptions& options, Job& job) {
   std::vector<std::size_t> counted(pictures.size());
   std::iota(counted.begin(), counted.end(), std::size_t(0));
-  const auto verdict = [&](std::vector<std::size_t> order) {
-    return judge(fit_clock(shots, pictures, std::move(order), options, job), shots.size(), pictures.size(),
+  const auto verdict = [&](std::vector<std::size_t> order, bool may_be_set) {
+    return judge(fit_clock(shots, pictures, std::move(order), may_be_set, options, job), shots.size(), pictures.size(),
                  options.clock_offset_s.has_value());
   };
-  Verdict first = verdict(counted);
+  Verdict first = verdict(counted, true);
   std::vector<std::size_t> timed = order_of_times(pictures);
   if (timed == counted) return first;
-  Verdict second = verdict(timed);
+  Verdict second = verdict(timed, false);
   if (second.fit.chains.best > first.fit.chains.best) std::swap(first, second);
   if (second.fit.chains.best < first.fit.chains.best - kMargin) return first;
   std::set<Couple> others;
@@ -206,9 +206,10 @@ class Gaps {
       doubt = doubt || shots_[s].state == ShotState::unknown;
     }
     constexpr std::size_t kFew = 2;
-    if (!one_clock && !clock_known_ && std::min(places.size(), shots.size()) >= kFew && !untimed_shot &&
-        !untimed_picture)
-      return leave_open(places, shots, "their times fit no clock that was found: was it set in between?");
+    // Where the clock was set, or may have been, what fits nothing that was found may fit what was not.
+    if (!one_clock && !clock_known_ && !untimed_shot && !untimed_picture && places.size() + shots.size() > 0 &&
+        (open || std::min(places.size(), shots.size()) >= kFew))
+      return leave_open(places, shots, "their times fit no clock that is sure: was it set in between?");
     // Those whose times have spoken against all of the other side need no further look.
     const auto settled_place = [&](std::size_t p) { return picture(p).clock_s && !untimed_shot; };
     const auto settled_shot = [&](std::size_t s) { return shots_[s].time_unix_s && !untimed_picture; };

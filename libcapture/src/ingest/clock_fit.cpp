@@ -20,7 +20,7 @@ constexpr double kUnknownCost = 0.6931;  ///< an exposure in doubt is as likely 
 
 // A clock that is set by whole quarters of an hour (summer time, time zones) is likelier than one set at random.
 constexpr double kZoneStep_s = 900, kMostZone_s = 14 * 3600, kZoneSlack_s = 2;
-constexpr double kZoneCost = 18, kSetCost = 50;
+constexpr double kZoneCost = 18, kSetCost = 50, kNever = 1e12;
 
 double step_cost(double from_s, double to_s) {
   const double step = std::abs(to_s - from_s), quarters = std::round(step / kZoneStep_s);
@@ -38,8 +38,8 @@ double median(std::vector<double> values, double fallback) {
 class Fitter {
  public:
   Fitter(std::span<const ExpectedShot> shots, std::span<const CardPicture> pictures, std::vector<std::size_t> order,
-         const AlignOptions& options, Job& job)
-      : shots_(shots), pictures_(pictures), options_(options), job_(job) {
+         bool may_be_set, const AlignOptions& options, Job& job)
+      : shots_(shots), pictures_(pictures), may_be_set_(may_be_set), options_(options), job_(job) {
     fit_.order = std::move(order);
     for (std::size_t j = 0; j < shots.size(); ++j)
       if (shots[j].time_unix_s && shots[j].state != ShotState::refused) timed_.push_back({*shots[j].time_unix_s, j});
@@ -202,7 +202,7 @@ class Fitter {
     std::vector<double> cost(clocks * clocks, 0);
     for (std::size_t a = 0; a < clocks; ++a)
       for (std::size_t b = 0; b < clocks; ++b)
-        if (a != b) cost[a * clocks + b] = step_cost(fit_.offsets_s[a], fit_.offsets_s[b]);
+        if (a != b) cost[a * clocks + b] = may_be_set_ ? step_cost(fit_.offsets_s[a], fit_.offsets_s[b]) : kNever;
     fit_.chains = heaviest_chains(fit_.pairs, shots_.size(), clocks, cost);
   }
 
@@ -264,6 +264,7 @@ class Fitter {
 
   std::span<const ExpectedShot> shots_;
   std::span<const CardPicture> pictures_;
+  bool may_be_set_;
   const AlignOptions& options_;
   Job& job_;
   std::vector<std::pair<double, std::size_t>> timed_;  ///< shots by time
@@ -275,8 +276,8 @@ class Fitter {
 }  // namespace
 
 ClockFit fit_clock(std::span<const ExpectedShot> shots, std::span<const CardPicture> pictures,
-                   std::vector<std::size_t> order, const AlignOptions& options, Job& job) {
-  return Fitter(shots, pictures, std::move(order), options, job).run();
+                   std::vector<std::size_t> order, bool may_be_set, const AlignOptions& options, Job& job) {
+  return Fitter(shots, pictures, std::move(order), may_be_set, options, job).run();
 }
 
 }  // namespace lumihull::capture

@@ -34,7 +34,8 @@ inline std::optional<double> middle_time(const CardPicture& p) {
   return *p.clock_s + p.resolution_s / 2;
 }
 
+/// order: of all pictures. may_be_set: whether the clock may have been set on the way.
 ClockFit fit_clock(std::span<const ExpectedShot> shots, std::span<const CardPicture> pictures,
-                   std::vector<std::size_t> order, const AlignOptions& options, Job& job);
+                   std::vector<std::size_t> order, bool may_be_set, const AlignOptions& options, Job& job);
 
 }  // namespace lumihull::capture
