@@ -62,8 +62,10 @@ inline History make_history(const HistoryOptions& o, std::uint64_t seed) {
       made = chance(0.5);
     }
     const double real = t + 0.2 + 0.08 * normal(random);  // the shutter's lag
-    if (made) exposures.push_back({real, std::ptrdiff_t(j)});
-    else alone.push_back(t);
+    if (made)
+      exposures.push_back({real, std::ptrdiff_t(j)});
+    else
+      alone.push_back(t);
     h.shots.push_back(shot);
   }
   const double end = t;
@@ -75,7 +77,8 @@ inline History make_history(const HistoryOptions& o, std::uint64_t seed) {
       exposures.push_back({when, -1});
   }
   for (std::size_t n = 0; n < o.others; ++n) exposures.push_back({start - 86400 + uniform(0, 3600), -1});
-  std::stable_sort(exposures.begin(), exposures.end(), [](const Exposure& a, const Exposure& b) { return a.time_s < b.time_s; });
+  std::stable_sort(exposures.begin(), exposures.end(),
+                   [](const Exposure& a, const Exposure& b) { return a.time_s < b.time_s; });
 
   const double zone_at = uniform(start, end), set_at = uniform(start, end);
   int counter = o.first_counter;

@@ -62,10 +62,10 @@ struct FolderCameraOptions {
 /// never taken. It is complete when its writer has closed it or it has not grown for `quiet_s`, and its content ends as
 /// JPEG or PNG must. Hidden files and those of unfinished transfers (.part, .tmp, .crdownload, …) are not looked at.
 /// A second file with the first one's content is the same picture; with another, two pictures came: then the outcome is
-/// `done` without a file, and both stay where they are. Files are moved into the shot's folder under the shot's number
-/// (copied where that is another file system).
+/// `done` without a file, and both stay where they are. Files are moved into the shot's folder under the shot's number.
 ///
-/// shoot's outcome: `unknown` where no picture came in time. As above, no number is exposed twice.
+/// shoot's outcome: `unknown` where no picture came in time; the next shot's `detail` then says that its picture may be
+/// the late one, for a folder does not tell. As above, no number is exposed twice.
 /// Errors: not_found, invalid_argument (`watched` is no folder, times that are not positive), io.
 LUMIHULL_API std::unique_ptr<CameraDevice> watch_folder(const FolderCameraOptions& options);
 
