@@ -98,15 +98,15 @@ inline History make_history(const HistoryOptions& o, std::uint64_t seed) {
   return h;
 }
 
-/// A history of any kind.
-inline HistoryOptions any_history(std::uint64_t seed) {
+/// A history of any kind, of 2 to `most_shots` shots.
+inline HistoryOptions any_history(std::uint64_t seed, double most_shots = 400) {
   std::mt19937_64 random(seed * 7919 + 1);
   const auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
   const auto pick = [&](std::initializer_list<double> values) {
     return *(values.begin() + std::ptrdiff_t(random() % values.size()));
   };
   HistoryOptions o;
-  o.shots = std::size_t(std::exp(uniform(std::log(2.0), std::log(400.0))));
+  o.shots = std::size_t(std::exp(uniform(std::log(2.0), std::log(most_shots))));
   o.rhythm = int(random() % 3);
   o.missing = pick({0, 0, 0.02, 0.1, 0.25});
   o.missing_run = random() % 4 == 0 ? std::size_t(uniform(0, 0.3) * double(o.shots)) : 0;

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostEntries = 200'000;
+constexpr std::size_t kMostEntries = 50'000;
 constexpr int kMostFolders = 16;
 
 /// One line without control characters, as errors have it.

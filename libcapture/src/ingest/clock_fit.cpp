@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "clock_vote.h"
 
@@ -14,8 +15,9 @@ constexpr std::size_t kMoreClocks = 6;  ///< of what the first ones leave over: 
 constexpr std::size_t kMostClocks = 60;
 constexpr int kMostRounds = 8;
 constexpr double kMostDrift = 5e-4;
-constexpr double kLeastSpread_s = 0.2, kMostSpread_s = 0.6;
-constexpr double kStartSpread_s = 0.4;
+// Of residuals. Whole seconds may be cut alike for a hundred pictures that follow a beat and otherwise for the next
+// one: their spread is not what it looks like.
+constexpr double kLeastSpread_s = 0.2, kLeastOfSeconds_s = 0.45, kMostSpread_s = 0.6;
 constexpr double kUnknownCost = 0.6931;  ///< an exposure in doubt is as likely as not
 
 // A clock that is set by whole quarters of an hour (summer time, time zones) is likelier than one set at random.
@@ -48,6 +50,9 @@ class Fitter {
     for (std::size_t i = 1; i < timed_.size(); ++i)
       if (timed_[i].first > timed_[i - 1].first) intervals.push_back(timed_[i].first - timed_[i - 1].first);
     interval_s_ = median(intervals, 10);
+    constexpr double kCoarse_s = 0.5;
+    for (const CardPicture& p : pictures)
+      if (p.resolution_s > kCoarse_s) least_spread_s_ = kLeastOfSeconds_s;
     if (!timed_.empty()) fit_.reference_s = timed_.front().first;
   }
 
@@ -71,8 +76,25 @@ class Fitter {
   double span_s() const { return timed_.empty() ? 0 : timed_.back().first - timed_.front().first; }
   std::optional<double> time(std::size_t place) const { return middle_time(pictures_[fit_.order[place]]); }
 
-  /// Offsets of those pictures and shots that `used` does not name, added to the clocks: the first `most` by votes, or,
-  /// `near` an offset, the nearest with at least half of the most votes. Returns how many are new.
+  /// Of offsets with at least half of the most votes: on both sides of `near` the 1st, 2nd, 3rd, 5th, 8th, …
+  static std::vector<ClockOffset> around(double near, std::vector<ClockOffset> voted) {
+    std::vector<ClockOffset> out;
+    if (voted.empty()) return out;
+    std::erase_if(voted, [most = voted[0].votes](const ClockOffset& o) { return 2 * o.votes < most; });
+    std::sort(voted.begin(), voted.end(),
+              [](const ClockOffset& a, const ClockOffset& b) { return a.offset_s < b.offset_s; });
+    const auto split = std::partition_point(
+        voted.begin(), voted.end(), [&](const ClockOffset& o) { return o.offset_s < near - kVoteWindow_s / 2; });
+    const auto below = std::size_t(split - voted.begin());
+    for (std::size_t step = 1, next = 2; step <= voted.size(); step = std::exchange(next, step + next)) {
+      if (step <= below) out.push_back(voted[below - step]);
+      if (below + step - 1 < voted.size()) out.push_back(voted[below + step - 1]);
+    }
+    return out;
+  }
+
+  /// Offsets of those pictures and shots that `used` does not name, added to the clocks: the first `most` by votes, or
+  /// those around `near`. Returns how many are new.
   std::size_t add_clocks(const std::vector<char>& used_places, const std::vector<char>& used_shots, std::size_t most,
                          std::optional<double> near = std::nullopt) {
     std::vector<double> ours, theirs;
@@ -80,16 +102,9 @@ class Fitter {
       if (const auto t = time(i); t && !used_places[i]) ours.push_back(*t);
     for (const auto& [t, j] : timed_)
       if (!used_shots[j]) theirs.push_back(t + fit_.drift * (t - fit_.reference_s));
-    constexpr std::size_t kMostNear = 100;
+    constexpr std::size_t kMostNear = 200;
     std::vector<ClockOffset> voted = vote_offsets(ours, theirs, near ? kMostNear : most);
-    if (near) {
-      std::erase_if(
-          voted, [&, votes = voted.empty() ? 0 : voted[0].votes](const ClockOffset& o) { return 2 * o.votes < votes; });
-      std::sort(voted.begin(), voted.end(), [&](const ClockOffset& a, const ClockOffset& b) {
-        return std::abs(a.offset_s - *near) < std::abs(b.offset_s - *near);
-      });
-      voted.resize(std::min(voted.size(), most));
-    }
+    if (near) voted = around(*near, std::move(voted));
     std::size_t added = 0;
     for (const ClockOffset& o : voted) {
       if (options_.clock_offset_s && std::abs(o.offset_s - *options_.clock_offset_s) > options_.clock_tolerance_s)
@@ -119,15 +134,16 @@ class Fitter {
       if (add_clocks(places, shots, kMoreClocks) == 0) break;
       settle_clocks(before);
     }
-    constexpr int kMostSteps = 6;
-    for (int step = 0; step < kMostSteps && add_rivals(); ++step) {
-    }
+    constexpr int kMostSteps = 40;
+    for (int step = 0; step < kMostSteps && add_rivals(); ++step) job_.check();
   }
 
   /// Each stretch of the chain may have rivals of its own that all the rest outvoted: a regular capture looks the same
-  /// one shot later. False where there are no more.
+  /// one beat later. True where one of them is better, so that this is to be asked again.
   bool add_rivals() {
     chain();
+    const double best = fit_.chains.best;
+    forget_hopeless();
     const std::size_t before = fit_.offsets_s.size();
     for (std::size_t clock = 0; clock < before; ++clock) {
       std::vector<char> others(fit_.order.size(), 1);
@@ -137,10 +153,25 @@ class Fitter {
           others[fit_.pairs[n].picture] = 0;
           ++own;
         }
-      if (own > 0) add_clocks(others, std::vector<char>(shots_.size(), 0), kMoreClocks, fit_.offsets_s[clock]);
+      if (own > 0) add_clocks(others, std::vector<char>(shots_.size(), 0), 0, fit_.offsets_s[clock]);
     }
     settle_clocks(before);
-    return fit_.offsets_s.size() > before;
+    if (fit_.offsets_s.size() > before) chain();
+    return fit_.chains.best > best + 1e-6;
+  }
+
+  /// Takes out clocks that no chain near the best one follows.
+  void forget_hopeless() {
+    constexpr double kHopeless = 60;
+    std::vector<double> through(fit_.offsets_s.size(), -1);
+    for (std::size_t n = 0; n < fit_.pairs.size(); ++n)
+      through[fit_.pairs[n].clock] = std::max(through[fit_.pairs[n].clock], fit_.chains.through[n]);
+    std::vector<double> kept;
+    for (std::size_t clock = 0; clock < through.size(); ++clock)
+      if (through[clock] >= fit_.chains.best - kHopeless) kept.push_back(fit_.offsets_s[clock]);
+    if (kept.size() == fit_.offsets_s.size()) return;
+    fit_.offsets_s = std::move(kept);
+    chain();
   }
 
   /// Each clock's offset from its own best chain: else a rival would look worse than it is.
@@ -221,7 +252,7 @@ class Fitter {
     if (path.size() >= kEnough) {
       std::vector<double> sizes;
       for (const std::size_t n : path) sizes.push_back(std::abs(residual(fit_.pairs[n], fit_.pairs[n].clock)));
-      spread_s_ = std::clamp(1.4826 * median(sizes, kStartSpread_s), kLeastSpread_s, kMostSpread_s);
+      spread_s_ = std::clamp(1.4826 * median(sizes, 0), least_spread_s_, kMostSpread_s);
     }
     // What lies beyond the first and the last pair may be of another day: it tells nothing of this capture.
     const Pair &first = fit_.pairs[path.front()], &last = fit_.pairs[path.back()];
@@ -234,7 +265,7 @@ class Fitter {
       missing += !has && shots_[j].state == ShotState::done && shots_[j].time_unix_s.has_value();
     }
     const auto cost = [](double faults, std::size_t of) {
-      return -std::log(std::min(0.3, (faults + 0.1) / (double(of) + 10)));
+      return -std::log(std::min(0.3, (faults + 0.5) / (double(of) + 10)));
     };
     missing_cost_ = cost(missing, shots_.size());
     extra_cost_ = cost(extra, last.picture - first.picture + 1);
@@ -268,7 +299,8 @@ class Fitter {
   const AlignOptions& options_;
   Job& job_;
   std::vector<std::pair<double, std::size_t>> timed_;  ///< shots by time
-  double interval_s_ = 10, spread_s_ = kStartSpread_s, missing_cost_ = 4, extra_cost_ = 4;
+  double interval_s_ = 10, spread_s_ = kLeastOfSeconds_s, least_spread_s_ = kLeastSpread_s, missing_cost_ = 4,
+         extra_cost_ = 4;
   bool moved_ = false;
   ClockFit fit_;
 };

@@ -37,8 +37,8 @@ struct Card {
   std::vector<std::string> notes;     ///< what was passed over, and why
 };
 
-/// Looks for pictures in a folder and those below it. Links, pipes and devices are passed over, a million files is
-/// an error. Errors: not_found, bad_input (no folder, more than 200,000 entries, deeper than 16 folders), io,
+/// Looks for pictures in a folder and those below it. Links, pipes and devices are passed over, a million files are
+/// an error. Errors: not_found, bad_input (no folder, more than 50,000 entries, deeper than 16 folders), io,
 /// cancelled.
 LUMIHULL_API Card read_card(const std::filesystem::path& folder, Job& job);
 
