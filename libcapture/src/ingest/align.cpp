@@ -14,7 +14,7 @@ namespace lumihull::capture {
 namespace {
 
 constexpr double kLeastGain = 4;           ///< a pair worth less is too far off to be believed
-constexpr std::size_t kLeastPerClock = 3;  ///< fewer pairs fit some clock by chance
+constexpr std::size_t kLeastPerClock = 6;  ///< fewer pairs may fit a clock by chance
 
 using Couple = std::pair<std::size_t, std::size_t>;  // picture, shot
 

@@ -20,9 +20,10 @@ constexpr double kMostDrift = 5e-4;
 constexpr double kLeastSpread_s = 0.2, kLeastOfSeconds_s = 0.45, kMostSpread_s = 0.6;
 constexpr double kUnknownCost = 0.6931;  ///< an exposure in doubt is as likely as not
 
-// A clock that is set by whole quarters of an hour (summer time, time zones) is likelier than one set at random.
-constexpr double kZoneStep_s = 900, kMostZone_s = 14 * 3600, kZoneSlack_s = 2;
-constexpr double kZoneCost = 18, kSetCost = 50, kNever = 1e12;
+// A clock that is set by whole quarters of an hour (summer time, time zones) is likelier than one set at random, but
+// not by much: among many rivals some step comes near a quarter by chance.
+constexpr double kZoneStep_s = 900, kMostZone_s = 14 * 3600, kZoneSlack_s = 1;
+constexpr double kZoneCost = 40, kSetCost = 50, kNever = 1e12;
 
 double step_cost(double from_s, double to_s) {
   const double step = std::abs(to_s - from_s), quarters = std::round(step / kZoneStep_s);
