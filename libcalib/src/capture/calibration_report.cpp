@@ -2,6 +2,7 @@
 #include "calibration_report.h"
 
 #include <lumihull/internal/html.h>
+#include <lumihull/internal/svg_figure.h>
 
 #include <algorithm>
 #include <array>
@@ -9,14 +10,13 @@
 #include <map>
 #include <numbers>
 
-#include "../lens/svg_figure.h"
 #include "report_parts.h"
 
 namespace lumihull::calib {
 namespace {
 
-using lens::number;
 using lumihull::internal::html_escaped;
+using lumihull::internal::number;
 
 constexpr std::size_t kMostRemoved = 200;
 
@@ -186,8 +186,8 @@ std::string calibration_report_html(const Capture& capture, const TargetModel& m
   std::string page =
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
       "content=\"width=device-width\"><title>Calibration</title><style>" +
-      std::string(kStyle) + lens::SvgFigure::style_sheet() + "</style></head><body>\n<h1>Calibration</h1>\n" +
-      "<p class=\"verdict\">" + html_escaped(c.verdict) + "</p>\n";
+      std::string(kStyle) + lumihull::internal::SvgFigure::style_sheet() +
+      "</style></head><body>\n<h1>Calibration</h1>\n" + "<p class=\"verdict\">" + html_escaped(c.verdict) + "</p>\n";
   for (const std::string& warning : c.warnings) page += "<p class=\"problem\">" + html_escaped(warning) + "</p>\n";
   page += figures(model);
   page += "<h2>Cameras and targets</h2>\n" + report::scene(model);

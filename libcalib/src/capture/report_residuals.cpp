@@ -1,19 +1,19 @@
 // What calibration left between measured and predicted pixels, as figures.
 #include <lumihull/internal/html.h>
+#include <lumihull/internal/svg_figure.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "../lens/svg_figure.h"
 #include "report_parts.h"
 
 namespace lumihull::calib::report {
 namespace {
 
-using lens::number;
-using lens::SvgFigure;
 using lumihull::internal::html_escaped;
+using lumihull::internal::number;
+using lumihull::internal::SvgFigure;
 
 bool counts(const CalibrationResidual& r) { return !r.removed && r.error.allFinite(); }
 
@@ -70,8 +70,9 @@ std::string coverage(const TargetModel& model, std::size_t camera) {
   figure.axes(0, k.width, k.height, 0, "u, px", "v, px");
   for (int i = 0; i < cells.count(); ++i) {
     const std::size_t count = n[std::size_t(i)];
-    cells.paint(figure, i,
-                count == 0 ? kUnseen : lens::map_color(std::log1p(double(count)) / std::log1p(double(most))));
+    cells.paint(
+        figure, i,
+        count == 0 ? kUnseen : lumihull::internal::map_color(std::log1p(double(count)) / std::log1p(double(most))));
   }
   return figure.str();
 }
@@ -98,14 +99,16 @@ std::string residual_map(const TargetModel& model, std::size_t camera) {
     figure.note("too few points for a map");
     return figure.str();
   }
-  const double times = lens::magnification(model.calibration.rms_px, 0.03 * k.width);
+  const double times = lumihull::internal::magnification(model.calibration.rms_px, 0.03 * k.width);
   figure.note("RMS in cells of 5 points or more, " + number("%.3g", low) + " (dark) to " + number("%.3g", high) +
               " px (bright); white: mean error, " + number("%g", times) +
               " times as large; a pattern: the lens does not fit");
   figure.axes(0, k.width, k.height, 0, "u, px", "v, px");
   for (int i = 0; i < cells.count(); ++i) {
     const Mean& m = means[std::size_t(i)];
-    cells.paint(figure, i, m.n < kEnough ? kUnseen : lens::map_color(high > low ? (m.rms() - low) / (high - low) : 0));
+    cells.paint(
+        figure, i,
+        m.n < kEnough ? kUnseen : lumihull::internal::map_color(high > low ? (m.rms() - low) / (high - low) : 0));
   }
   for (int i = 0; i < cells.count(); ++i) {
     const Mean& m = means[std::size_t(i)];
@@ -169,7 +172,7 @@ std::string drawn(const Capture& capture, const TargetModel& model, std::size_t 
   if (small.type() != PixelType::u8) small = converted(small, PixelType::u8, 3);
   small = fitted(small, kSide);
   const double scale = small.width() / full_width, high = full_height * scale;
-  const double times = lens::magnification(c.photos[photo].rms_px, 12 / scale);
+  const double times = lumihull::internal::magnification(c.photos[photo].rms_px, 12 / scale);
   const std::string w = std::to_string(small.width()), h = std::to_string(small.height());
   std::string out = "<figure><svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + w + " " + h + "\" width=\"" +
                     w + "\" height=\"" + h + "\" role=\"img\"><image width=\"" + w + "\" height=\"" + h +

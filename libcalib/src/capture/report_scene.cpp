@@ -1,5 +1,6 @@
 // Cameras and targets in space, as SVG. Every shape carries its points, so that a short script can turn the view.
 #include <lumihull/internal/html.h>
+#include <lumihull/internal/svg_figure.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -9,15 +10,14 @@
 #include <map>
 #include <numbers>
 
-#include "../lens/svg_figure.h"
 #include "report_parts.h"
 
 namespace lumihull::calib::report {
 namespace {
 
 using Eigen::Vector3d;
-using lens::number;
 using lumihull::internal::html_escaped;
+using lumihull::internal::number;
 
 constexpr int kWidth = 760, kHeight = 560, kSmallWidth = 376, kSmallHeight = 320;
 constexpr double kReach = 1000;  ///< points are whole numbers of thousandths of the scene's reach
@@ -227,7 +227,7 @@ std::string scene(const TargetModel& model) {
     body_covariances.push_back(sum / double(std::max<std::size_t>(1, b->point_covariances.size())));
     sizes.push_back(longest_axis(body_covariances.back()));
   }
-  const double times = lens::magnification(median(sizes), 0.04 * frame.reach);
+  const double times = lumihull::internal::magnification(median(sizes), 0.04 * frame.reach);
   const std::size_t step = (photos.size() + bodies.size()) / kMostEllipsoids + 1;
   for (std::size_t i = 0; i < photos.size(); i += step)
     add_ellipsoid(photos[i]->cam_from_world->center(), center_covariance(*photos[i]), times, frame, shapes);

@@ -2,19 +2,18 @@
 #include <lumihull/base/error.h>
 #include <lumihull/calib/lens_calibration.h>
 #include <lumihull/internal/html.h>
+#include <lumihull/internal/svg_figure.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "svg_figure.h"
-
 namespace lumihull::calib {
 namespace {
 
 using lumihull::internal::html_escaped;
-using lens::number;
-using lens::SvgFigure;
+using lumihull::internal::number;
+using lumihull::internal::SvgFigure;
 
 /// More vectors than this would make a page that no browser likes; every nth is drawn then.
 constexpr std::size_t kMostDrawn = 6000;
@@ -28,7 +27,7 @@ struct Seen {
 std::string vectors(const LensCalibration& c, const std::vector<Seen>& seen) {
   const double w = c.camera.width, h = c.camera.height;
   SvgFigure figure("Residuals over the picture", 760, 760 * std::clamp(h / w, 0.3, 2.0) + 40);
-  const double times = lens::magnification(c.rms_px, 0.02 * w);
+  const double times = lumihull::internal::magnification(c.rms_px, 0.02 * w);
   const std::size_t step = seen.size() / kMostDrawn + 1;
   figure.note("measured less predicted, " + number("%g", times) + " times as large" +
               (step > 1 ? ", every " + std::to_string(step) + "th" : "") + "; orange: outliers; green: means of cells");
@@ -129,7 +128,7 @@ std::string uncertainty_map(const LensCalibration& c) {
     // Logarithmic: corners are often ten times worse than the middle.
     const double t =
         high > low && s > 0 ? std::log(s / std::max(low, 1e-300)) / std::log(high / std::max(low, 1e-300)) : 0;
-    figure.box(x, y, x + w / kColumns, y + h / kRows, std::isfinite(s) ? lens::map_color(t) : "#808080");
+    figure.box(x, y, x + w / kColumns, y + h / kRows, std::isfinite(s) ? lumihull::internal::map_color(t) : "#808080");
   }
   for (int y = 2; y < kRows; y += 5)
     for (int x = 2; x < kColumns; x += 7)

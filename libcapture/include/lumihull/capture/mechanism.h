@@ -46,10 +46,15 @@ struct Mechanism {
   double gravity_m_s2 = 9.80665;  ///< along -z
   MotionLimits limits;
 
-  /// Where the camera sits while the bearing's angle is zero. The camera turns about its own optical axis:
-  /// cam_from_platform(roll) = Rz(roll) * cam_from_platform (paper, 2.3: gravity turns it, a solenoid locks it).
+  /// Where the camera sits while the bearing's angle is zero. The bearing turns it about the platform's z axis, the
+  /// end-effector's central axis, from which the optical axis is offset; gravity turns it, a solenoid locks it (paper,
+  /// 2.3). At the angle theta it looks towards where it looked before, turned by theta: an end-effector that is
+  /// tilted without torsion needs theta = the azimuth of the view.
   Pose cam_from_platform;
 };
+
+/// cam_from_platform * Rz(-bearing).
+LUMIHULL_API Pose cam_from_platform(const Mechanism& mechanism, double bearing_rad);
 
 /// Error{bad_input} with `subject` where a value is not finite or outside its range, a name is used twice, a
 /// departure point lies outside the room by more than 1 mm, or a tension or length range is empty.
@@ -59,7 +64,8 @@ LUMIHULL_API void check(const Mechanism& mechanism, const std::string& subject =
 LUMIHULL_API Mechanism read_mechanism(const std::filesystem::path& file);
 LUMIHULL_API void write_mechanism(const Mechanism& mechanism, const std::filesystem::path& file);
 
-/// The paper's architecture: six cables, three attachment points, a room of 10 x 12 x 6 m (sections 2.1 to 2.3).
+/// The paper's architecture: six cables, three attachment points, a room of 10 x 12 x 6 m (sections 2.1 to 2.3), the
+/// object's centre 1 m above the floor's; all views of a hemisphere of 1.5 m at the paper's tilt are controlled.
 LUMIHULL_API Mechanism paper_mechanism();
 
 }  // namespace lumihull::capture

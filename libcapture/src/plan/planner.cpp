@@ -1,0 +1,332 @@
+// Orders of stops: the paper's raster, and one that travels less.
+#include <lumihull/base/error.h>
+#include <lumihull/base/parallel.h>
+#include <lumihull/capture/planner.h>
+#include <lumihull/capture/workspace.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <unordered_map>
+#include <utility>
+
+#include "tour.h"
+#include "ways.h"
+
+namespace lumihull::capture {
+namespace {
+
+using internal::Way;
+
+constexpr double kBlocked_s = 1e6;  // so long that any other order is preferred
+
+void expect_between(double value, double low, double high, const char* name) {
+  if (std::isfinite(value) && value >= low && value <= high) return;
+  char text[160];
+  std::snprintf(text, sizeof text, "expected a number from %g to %g, not %g", low, high, value);
+  throw Error(ErrorCode::invalid_argument, text, name);
+}
+
+/// Stops that share a bearing, and where the camera is turned to it: indices into Planner::stops_.
+struct Group {
+  int turn = -1;
+  std::vector<int> stops;
+};
+
+class Planner {
+ public:
+  Planner(const Mechanism& mechanism, const HemisphereOptions& views, const PlannerOptions& options, Job& job)
+      : mechanism_(mechanism),
+        views_(views),
+        options_(options),
+        job_(job),
+        object_(options.object ? &*options.object : nullptr),
+        finder_(mechanism, object_, views.center, options.limits) {
+    check(mechanism);
+    check(views);
+    check(options);
+  }
+
+  PlannedTour raster() {
+    if (!views_.thin) views_.bearing_tolerance_rad = 0;
+    keep_stops_that_can_be_taken();
+    if (views_.thin) gather_in_columns();
+    make_groups();
+    std::vector<int> order;
+    for (const Group& group : groups_) {
+      if (group.turn >= 0) order.push_back(group.turn);
+      order.insert(order.end(), group.stops.begin(), group.stops.end());
+    }
+    return finished(order);
+  }
+
+  PlannedTour shortest() {
+    keep_stops_that_can_be_taken();
+    make_groups();
+    std::vector<int> order;
+    job_.begin("ordering the stops", groups_.size());
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      const Group& group = groups_[g];
+      internal::PathProblem problem;
+      problem.places = group.stops;
+      problem.before = group.turn;
+      problem.after = g + 1 < groups_.size() ? groups_[g + 1].turn : -1;
+      problem.cost = [this](int a, int b) { return cost_s(a, b); };
+      problem.true_cost = [this](int a, int b) { return way_s(a, b); };
+      problem.distance = [this](int a, int b) { return motion_distance(mechanism_, pose(a), pose(b)); };
+      problem.starts = meanders(group.stops);
+      if (group.turn >= 0) order.push_back(group.turn);
+      const std::vector<int> path = internal::short_path(problem, options_.kicks, options_.seed + g, job_);
+      order.insert(order.end(), path.begin(), path.end());
+      job_.advance();
+    }
+    job_.end();
+    return finished(order);
+  }
+
+ private:
+  const Pose& pose(int i) const { return stops_[std::size_t(i)].world_from_platform; }
+
+  void keep_stops_that_can_be_taken() {
+    std::vector<PlannedStop> all = hemisphere_stops(mechanism_, views_);
+    std::vector<PoseJudgement> judged(all.size());
+    job_.begin("reaching the stops", all.size());
+    parallel_chunks(
+        job_, all.size(), 16,
+        [&](std::size_t first, std::size_t last) {
+          for (std::size_t i = first; i < last; ++i)
+            judged[i] = judge_pose(mechanism_, all[i].world_from_platform, object_, options_.limits);
+        },
+        true);
+    job_.end();
+    std::vector<PoseJudgement> refused;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (judged[i].ok()) {
+        stops_.push_back(std::move(all[i]));
+      } else {
+        tour_.left_out.push_back(all[i].name);
+        refused.push_back(std::move(judged[i]));
+      }
+    }
+    tour_.left_out_why = obstacles_in_words(refused);
+    if (!stops_.empty()) return;
+    std::string why;
+    for (std::size_t i = 0; i < std::min<std::size_t>(3, tour_.left_out_why.size()); ++i)
+      why += "; " + tour_.left_out_why[i];
+    throw Error(ErrorCode::degenerate, "none of the " + std::to_string(all.size()) + " stops can be taken" + why,
+                mechanism_.name);
+  }
+
+  /// Rows with fewer azimuths have none in common: each stop belongs to the equator's nearest azimuth.
+  void gather_in_columns() {
+    std::size_t columns = 0;
+    for (const PlannedStop& stop : hemisphere_stops(mechanism_, views_))
+      columns += std::abs(stop.phi_rad - views_.phi_to_rad) < 1e-9;
+    const double step = 2 * std::numbers::pi / double(columns);
+    for (PlannedStop& stop : stops_) {
+      const double azimuth = step * double(std::lround(stop.theta_rad / step) % long(columns));
+      if (views_.bearing == Bearing::gravity) stop.roll_rad = azimuth;
+      stop.cam_from_world = cam_from_platform(mechanism_, stop.roll_rad) * stop.world_from_platform.inverse();
+    }
+    std::stable_sort(stops_.begin(), stops_.end(), [&](const PlannedStop& a, const PlannedStop& b) {
+      const long i = std::lround(a.theta_rad / step) % long(columns),
+                 j = std::lround(b.theta_rad / step) % long(columns);
+      return i != j ? i < j : a.phi_rad < b.phi_rad;
+    });
+  }
+
+  /// By bearing, in the order of the azimuths.
+  void make_groups() {
+    const int photographed = int(stops_.size());
+    std::map<double, std::size_t> known;
+    for (int i = 0; i < photographed; ++i) {
+      const double roll = views_.bearing == Bearing::gravity ? stops_[std::size_t(i)].roll_rad : 0;
+      const auto [at, added] = known.emplace(roll, groups_.size());
+      if (added) groups_.emplace_back();
+      groups_[at->second].stops.push_back(i);
+    }
+    if (views_.bearing != Bearing::gravity) return;
+    std::vector<Group> usable;
+    std::string why;
+    for (Group& group : groups_) {
+      const double azimuth = stops_[std::size_t(group.stops.front())].roll_rad;
+      if (auto place = turning_place(azimuth, int(usable.size()), &why)) {
+        group.turn = int(stops_.size());
+        stops_.push_back(std::move(*place));
+        usable.push_back(std::move(group));
+      } else {
+        for (const int i : group.stops) tour_.left_out.push_back(stops_[std::size_t(i)].name);
+        tour_.left_out_why.push_back("at " + std::to_string(group.stops.size()) + " stops: " + why);
+      }
+    }
+    groups_ = std::move(usable);
+    if (groups_.empty()) throw Error(ErrorCode::degenerate, why, mechanism_.name);
+  }
+
+  /// The lowest place of an azimuth that can be taken and is tilted enough.
+  std::optional<PlannedStop> turning_place(double azimuth, int number, std::string* why_not) const {
+    constexpr double kStep = std::numbers::pi / 180;
+    std::string why;
+    for (double phi = views_.phi_to_rad; phi >= 0; phi -= kStep) {
+      if (views_.tilt_rad(phi) < options_.release_tilt_rad) break;
+      const Pose pose =
+          platform_pose(views_.center, views_.radius_m, azimuth, phi, views_.tilt_factor, views_.tilt_offset_rad);
+      const PoseJudgement judged = judge_pose(mechanism_, pose, object_, options_.limits);
+      if (!judged.ok()) {
+        if (why.empty()) why = judged.obstacles.front().text;
+        continue;
+      }
+      PlannedStop stop = platform_stop(mechanism_, views_.center, pose, azimuth);
+      char name[32];
+      std::snprintf(name, sizeof name, "turn-%03d", number);
+      stop.name = name;
+      stop.photograph = false;
+      stop.settle_s = options_.turn_s, stop.exposure_s = 0;
+      return stop;
+    }
+    char text[300];
+    if (why.empty())
+      std::snprintf(text, sizeof text,
+                    "the camera can't be turned by gravity: at the largest polar angle the platform is tilted by %.1f "
+                    "degrees, at least %.1f are needed",
+                    views_.tilt_rad(views_.phi_to_rad) / kStep, options_.release_tilt_rad / kStep);
+    else
+      std::snprintf(text, sizeof text, "the camera can't be turned to azimuth %.1f degrees: %s", azimuth / kStep,
+                    why.c_str());
+    *why_not = text;
+    return {};
+  }
+
+  static std::uint64_t key(int a, int b) {
+    return (std::uint64_t(std::min(a, b)) << 32) | std::uint64_t(std::uint32_t(std::max(a, b)));
+  }
+
+  /// As far as it is known.
+  double cost_s(int a, int b) const {
+    const auto known = ways_.find(key(a, b));
+    return known != ways_.end() ? known->second : least_duration_s(mechanism_, pose(a), pose(b));
+  }
+  double way_s(int a, int b) {
+    const auto [at, added] = ways_.try_emplace(key(a, b), 0);
+    if (!added) return at->second;
+    const Way way = finder_.find(pose(a), pose(b));
+    return at->second = way.open ? way.duration_s : kBlocked_s;
+  }
+
+  /// Up one column and down the next; along one row and back the next.
+  std::vector<std::vector<int>> meanders(const std::vector<int>& stops) const {
+    std::vector<std::vector<int>> orders;
+    for (const bool columns : {true, false})
+      for (const bool up : {true, false}) {
+        const auto major = [&](int i) {
+          const PlannedStop& s = stops_[std::size_t(i)];
+          return columns ? s.theta_rad : s.phi_rad;
+        };
+        const auto minor = [&](int i) {
+          const PlannedStop& s = stops_[std::size_t(i)];
+          return columns ? s.phi_rad : s.theta_rad;
+        };
+        std::vector<int> order = stops;
+        std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+          return major(a) != major(b) ? major(a) < major(b) : minor(a) < minor(b);
+        });
+        bool turn = up;
+        for (std::size_t i = 0; i < order.size(); turn = !turn) {
+          std::size_t end = i;
+          while (end < order.size() && major(order[end]) == major(order[i])) ++end;
+          if (turn) std::reverse(order.begin() + std::ptrdiff_t(i), order.begin() + std::ptrdiff_t(end));
+          i = end;
+        }
+        orders.push_back(std::move(order));
+      }
+    return orders;
+  }
+
+  /// The stops in order, with the ways between them, times and pauses.
+  PlannedTour finished(const std::vector<int>& order) {
+    Plan& plan = tour_.plan;
+    plan.robot = "cables";
+    plan.mechanism = mechanism_;
+    plan.object = options_.object;
+    plan.cameras = options_.cameras;
+    int pictures = 0;
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      PlannedStop stop = stops_[std::size_t(order[k])];
+      if (k > 0) {
+        const PlannedStop& last = stops_[std::size_t(order[k - 1])];
+        const Way way = finder_.find(last.world_from_platform, stop.world_from_platform);
+        if (!way.open)
+          throw Error(ErrorCode::degenerate, "no way from " + last.name + " to " + stop.name + ": " + way.why,
+                      mechanism_.name);
+        tour_.travel_m += way.length_m;
+        tour_.travel_s += way.duration_s;
+        add_ways_round(way, last.roll_rad);
+        stop.travel_s =
+            plan_move(mechanism_, plan.stops.back().world_from_platform, stop.world_from_platform).duration_s();
+      }
+      if (stop.photograph) {
+        if (options_.pictures_per_battery > 0 && pictures == options_.pictures_per_battery) {
+          stop.pause = "Change the batteries of camera and end-effector: " + std::to_string(pictures) +
+                       " pictures since the last change.";
+          tour_.notes.push_back("pause before " + stop.name + ": the battery, after " + std::to_string(pictures) +
+                                " pictures");
+          pictures = 0;
+        }
+        ++pictures;
+      } else {
+        ++tour_.turns;
+      }
+      plan.stops.push_back(std::move(stop));
+    }
+    check(plan, mechanism_.name);
+    return std::move(tour_);
+  }
+
+  void add_ways_round(const Way& way, double roll) {
+    for (const Pose& pose : way.via) {
+      PlannedStop stop = platform_stop(mechanism_, views_.center, pose, roll);
+      char name[32];
+      std::snprintf(name, sizeof name, "way-%04d", tour_.ways_round++);
+      stop.name = name;
+      stop.photograph = false;
+      stop.settle_s = 0, stop.exposure_s = 0;
+      stop.travel_s = plan_move(mechanism_, tour_.plan.stops.back().world_from_platform, pose).duration_s();
+      tour_.plan.stops.push_back(std::move(stop));
+    }
+  }
+
+  const Mechanism& mechanism_;
+  HemisphereOptions views_;
+  const PlannerOptions& options_;
+  Job& job_;
+  const KeepOut* object_;
+  internal::WayFinder finder_;
+  std::vector<PlannedStop> stops_;  // that are photographed, then where the camera is turned
+  std::vector<Group> groups_;
+  std::unordered_map<std::uint64_t, double> ways_;  // s
+  PlannedTour tour_;
+};
+
+}  // namespace
+
+void check(const PlannerOptions& o) {
+  expect_between(o.limits.clearance_m, -10, 100, "clearance, m");
+  expect_between(o.limits.cable_clearance_m, -10, 100, "clearance of cables, m");
+  expect_between(o.turn_s, 0, 86400, "time to turn the camera, s");
+  expect_between(o.release_tilt_rad, 0, std::numbers::pi / 2, "tilt for turning the camera, rad");
+  expect_between(o.pictures_per_battery, 0, 1e9, "pictures a battery");
+  expect_between(o.kicks, 0, 1e8, "kicks");
+}
+
+PlannedTour plan_tour(const Mechanism& mechanism, const HemisphereOptions& views, const PlannerOptions& options,
+                      Job& job) {
+  return Planner(mechanism, views, options, job).shortest();
+}
+
+PlannedTour raster_tour(const Mechanism& mechanism, const HemisphereOptions& views, const PlannerOptions& options,
+                        Job& job) {
+  return Planner(mechanism, views, options, job).raster();
+}
+
+}  // namespace lumihull::capture
