@@ -141,7 +141,7 @@ class Landing {
       const std::string name = capture::land_photograph(journal, a_.folder, asked.id, fs::path(a_.card) / p.from[0]);
       for (std::size_t i = 1; i < p.from.size(); ++i) {  // the RAW file of a JPEG
         const fs::path to =
-            fs::path(a_.folder) / "photos" / (fs::path(name).stem().string() + p.to[i].extension().string());
+            fs::path(a_.folder) / "photos" / (fs::path(name).stem().string() + p.from[i].extension().string());
         AtomicFile out(to);
         out.write(read_file(fs::path(a_.card) / p.from[i]));
         if (!out.commit_new() && sha256_of_file(to) != sha256_of_file(fs::path(a_.card) / p.from[i]))
