@@ -136,6 +136,7 @@ int Program::run(int argc, char** argv) {
   add_intrinsics(*this);
   add_targets(*this);
   add_detect(*this);
+  add_ingest(*this);
   add_plan(*this);
   try {
     app.parse(argc, argv);

@@ -95,6 +95,7 @@ void add_info(Program& program);
 void add_intrinsics(Program& program);
 void add_targets(Program& program);
 void add_detect(Program& program);
+void add_ingest(Program& program);
 void add_plan(Program& program);
 
 }  // namespace lumihull::program

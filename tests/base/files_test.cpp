@@ -46,6 +46,27 @@ TEST(Files, UncommittedFilesLeaveNothingBehind) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
 }
 
+TEST(Files, ANewFileNeverReplacesAnything) {
+  const test::TemporaryFolder folder;
+  {
+    AtomicFile file(folder / "x");
+    file.write("first");
+    EXPECT_TRUE(file.commit_new());
+  }
+  {
+    AtomicFile file(folder / "x");
+    file.write("second");
+    EXPECT_FALSE(file.commit_new());
+  }
+  fs::create_symlink(folder / "nowhere", folder / "link");  // in use, too
+  {
+    AtomicFile file(folder / "link");
+    EXPECT_FALSE(file.commit_new());
+  }
+  EXPECT_EQ(read_file(folder / "x"), "first");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 2);
+}
+
 TEST(Files, AFullDiskIsAnErrorAndKeepsTheOldFile) {
   const test::TemporaryFolder folder;
   write_file(folder / "x", "old");

@@ -192,6 +192,25 @@ TEST(Exif, GivesWhatACameraWrites) {
   EXPECT_TRUE(same(upright, oriented(stored, 6)));
 }
 
+TEST(Exif, GivesFractionsOfSecondsAndTheTimeZone) {
+  const std::string plain = encode_jpeg(pattern(8, 8, 3));
+  const auto info_of = [&](const std::string& fraction, const std::string& offset) {
+    test::ExifBuilder exif;
+    exif.ascii(true, 0x9003, "2019:07:03 14:05:59");
+    exif.ascii(true, 0x9011, offset);
+    exif.ascii(true, 0x9291, fraction);
+    return decode_image_info(bytes_of(test::jpeg_with_exif(plain, exif.tiff())), "a.jpg");
+  };
+  EXPECT_DOUBLE_EQ(info_of("07", "+02:00").time_fraction_s.value(), 0.07);
+  EXPECT_DOUBLE_EQ(info_of("123456 ", "+02:00").time_fraction_s.value(), 0.123456);
+  EXPECT_EQ(info_of("0", "+02:00").time_offset_min, 120);
+  EXPECT_EQ(info_of("0", "-03:30").time_offset_min, -210);
+  for (const std::string bad : {"", " ", "x7", "7x", "-1", "1.5"})
+    EXPECT_FALSE(info_of(bad, "+02:00").time_fraction_s) << bad;
+  for (const std::string bad : {"", "   :  ", "02:00", "+2:00", "+16:00", "+02:60", "+02-00"})
+    EXPECT_FALSE(info_of("0", bad).time_offset_min) << bad;
+}
+
 TEST(Exif, ImpossibleValuesAreLeftOut) {
   test::ExifBuilder exif;
   exif.u16(false, 0x0112, 9);

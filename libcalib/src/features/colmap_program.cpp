@@ -4,14 +4,13 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/export.h>
 #include <lumihull/base/files.h>
+#include <lumihull/internal/child_process.h>
 
 #include <algorithm>
 #include <cstdlib>
 #include <deque>
 #include <fstream>
 #include <sstream>
-
-#include "child_process.h"
 
 namespace lumihull::calib {
 namespace {
@@ -57,7 +56,7 @@ class Step {
     job_.begin(stage, total);
     int status = 0;
     try {
-      status = run_child(command, job_, [&](const std::string& line) {
+      status = internal::run_child(command, job_, [&](const std::string& line) {
         log_ << line << "\n";
         if (line.find_first_not_of(" \t\r=") == std::string::npos) return;
         last.push_back(line);

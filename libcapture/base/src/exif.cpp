@@ -16,6 +16,8 @@ enum Tag : std::uint16_t {
   kOrientation = 0x0112,
   kExifFolder = 0x8769,
   kDateTimeOriginal = 0x9003,
+  kOffsetTimeOriginal = 0x9011,
+  kSubSecTimeOriginal = 0x9291,
   kFocalLength = 0x920a,
   kFocalLength35mm = 0xa405,
   kLensModel = 0xa434,
@@ -127,6 +129,25 @@ std::string iso_time(std::string_view t) {
   return out;
 }
 
+std::optional<double> second_fraction(std::string_view text) {
+  double value = 0, place = 1;
+  std::size_t digits = 0;
+  for (; digits < text.size() && text[digits] >= '0' && text[digits] <= '9' && digits < 9; ++digits)
+    value += (text[digits] - '0') * (place /= 10);
+  const std::size_t end = std::min(text.find_first_of(std::string_view(" \0", 2), digits), text.size());
+  if (digits == 0 || digits != end) return std::nullopt;
+  return value;
+}
+
+std::optional<int> utc_offset(std::string_view t) {
+  if (t.size() < 6 || (t[0] != '+' && t[0] != '-') || t[3] != ':') return std::nullopt;
+  for (const int i : {1, 2, 4, 5})
+    if (t[std::size_t(i)] < '0' || t[std::size_t(i)] > '9') return std::nullopt;
+  const int minutes = ((t[1] - '0') * 10 + t[2] - '0') * 60 + (t[4] - '0') * 10 + t[5] - '0';
+  if (minutes > 15 * 60 || t[4] > '5') return std::nullopt;
+  return t[0] == '-' ? -minutes : minutes;
+}
+
 void parse_exif(Bytes bytes, ImageInfo& info) {
   Tiff tiff(bytes);
   const auto folder = tiff.first_folder();
@@ -142,6 +163,8 @@ void parse_exif(Bytes bytes, ImageInfo& info) {
   if (!exif_folder) return;
   for_each_entry(tiff, *exif_folder, [&](std::uint32_t tag, std::uint64_t entry) {
     if (tag == kDateTimeOriginal) info.time = iso_time(tiff.text(entry));
+    if (tag == kSubSecTimeOriginal) info.time_fraction_s = second_fraction(tiff.text(entry));
+    if (tag == kOffsetTimeOriginal) info.time_offset_min = utc_offset(tiff.text(entry));
     if (tag == kLensModel) info.lens = clean_text(tiff.text(entry));
     if (tag == kFocalLength)
       if (const auto f = tiff.positive_rational(entry)) info.focal_length_mm = *f;

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <memory>
@@ -185,14 +186,41 @@ void AtomicFile::write(std::string_view bytes) {
   }
 }
 
+namespace {
+
+void sync_folder_of(const fs::path& file) {
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  const Descriptor parent(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (parent.value >= 0) ::fsync(parent.value);  // some file systems can't; the rename itself is atomic anyway
+}
+
+/// Renames where the new name is free; else -1 with EEXIST.
+int rename_new(const fs::path& from, const fs::path& to) {
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
+  if (errno != EINVAL && errno != ENOSYS) return -1;
+  // A file system without that call: a second name, then one less.
+  return ::link(from.c_str(), to.c_str()) == 0 ? ::unlink(from.c_str()) : -1;
+}
+
+}  // namespace
+
 void AtomicFile::commit() {
   if (::fsync(descriptor_) != 0) fail(errno, "can't write", file_);
   // Renamed while it is held, so that nobody takes it for a leftover; what can fail in closing, fsync has told already.
   if (::rename(temporary_.c_str(), file_.c_str()) != 0) fail(errno, "can't replace", file_);
   ::close(std::exchange(descriptor_, -1));
-  const fs::path folder = file_.has_parent_path() ? file_.parent_path() : fs::path(".");
-  const Descriptor parent(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (parent.value >= 0) ::fsync(parent.value);  // some file systems can't; the rename itself is atomic anyway
+  sync_folder_of(file_);
+}
+
+bool AtomicFile::commit_new() {
+  if (::fsync(descriptor_) != 0) fail(errno, "can't write", file_);
+  if (rename_new(temporary_, file_) != 0) {
+    if (errno != EEXIST) fail(errno, "can't put in place", file_);
+    return false;  // the destructor removes what was written
+  }
+  ::close(std::exchange(descriptor_, -1));
+  sync_folder_of(file_);
+  return true;
 }
 
 void write_file(const fs::path& file, std::string_view bytes) {

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -77,6 +78,10 @@ void parse_exif(Bytes tiff, ImageInfo& info);
 
 /// EXIF's "YYYY:MM:DD hh:mm:ss" as ISO 8601; empty where it is not a date.
 std::string iso_time(std::string_view exif_time);
+/// EXIF's "+hh:mm" in minutes, up to 15 hours either way.
+std::optional<int> utc_offset(std::string_view exif_offset);
+/// EXIF's decimals of a second ("07" is 0.07 s).
+std::optional<double> second_fraction(std::string_view exif_fraction);
 /// Printable ASCII of at most 255 characters without spaces at either end; other bytes become '?'.
 std::string clean_text(std::string_view text);
 

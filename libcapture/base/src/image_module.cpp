@@ -144,6 +144,8 @@ ImageInfo info_by_module(const std::filesystem::path& file) {
   if (std::isfinite(h.focal_length_35mm_mm) && h.focal_length_35mm_mm > 0)
     info.focal_length_35mm_mm = h.focal_length_35mm_mm;
   info.time = iso_time({h.time, sizeof h.time});
+  info.time_fraction_s = second_fraction({h.time_fraction, sizeof h.time_fraction});
+  info.time_offset_min = utc_offset({h.time_offset, sizeof h.time_offset});
   info.make = clean_text({h.make, sizeof h.make});
   info.model = clean_text({h.model, sizeof h.model});
   info.lens = clean_text({h.lens, sizeof h.lens});

@@ -15,6 +15,7 @@ struct lumihull_image_header {
   std::int32_t orientation;                      ///< EXIF 1 … 8
   double focal_length_mm, focal_length_35mm_mm;  ///< 0: not known
   char time[32];                                 ///< as EXIF writes it
+  char time_fraction[16], time_offset[16];       ///< SubSecTimeOriginal, OffsetTimeOriginal
   char make[128], model[128], lens[128];
 };
 
@@ -30,7 +31,7 @@ struct lumihull_image_module {
 }  // extern "C"
 
 namespace lumihull::internal {
-inline constexpr std::int32_t kImageModuleVersion = 1;
+inline constexpr std::int32_t kImageModuleVersion = 2;
 inline constexpr char kImageModuleFile[] = "lumihull_image_oiio.so";
 inline constexpr char kImageModuleEntry[] = "lumihull_image_module_entry";  ///< const lumihull_image_module*(void)
 }  // namespace lumihull::internal

@@ -47,6 +47,8 @@ void describe(Opened& opened) {
   h.focal_length_mm = spec.get_float_attribute("Exif:FocalLength", 0);
   h.focal_length_35mm_mm = spec.get_int_attribute("Exif:FocalLengthIn35mmFilm", 0);
   set_text(h.time, sizeof h.time, std::string(spec.get_string_attribute("Exif:DateTimeOriginal")));
+  set_text(h.time_fraction, sizeof h.time_fraction, std::string(spec.get_string_attribute("Exif:SubsecTimeOriginal")));
+  set_text(h.time_offset, sizeof h.time_offset, std::string(spec.get_string_attribute("Exif:OffsetTimeOriginal")));
   set_text(h.make, sizeof h.make, std::string(spec.get_string_attribute("Make")));
   set_text(h.model, sizeof h.model, std::string(spec.get_string_attribute("Model")));
   set_text(h.lens, sizeof h.lens, std::string(spec.get_string_attribute("Exif:LensModel")));

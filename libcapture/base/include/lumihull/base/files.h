@@ -29,6 +29,8 @@ class LUMIHULL_API AtomicFile {
 
   void write(std::string_view bytes);
   void commit();
+  /// The same, but never replaces anything: false, and nothing is left behind, where the name is in use by now.
+  bool commit_new();
 
  private:
   std::filesystem::path file_, temporary_;

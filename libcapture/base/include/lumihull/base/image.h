@@ -76,7 +76,9 @@ struct ImageInfo {
   int orientation = 1;  ///< EXIF 1 … 8; 1 = as stored
   std::optional<double> focal_length_mm;
   std::optional<double> focal_length_35mm_mm;
-  std::string time;  ///< EXIF DateTimeOriginal as "YYYY-MM-DDThh:mm:ss", or empty
+  std::string time;                       ///< EXIF DateTimeOriginal as "YYYY-MM-DDThh:mm:ss", or empty
+  std::optional<double> time_fraction_s;  ///< EXIF SubSecTimeOriginal: 0 … less than 1 s behind `time`
+  std::optional<int> time_offset_min;     ///< EXIF OffsetTimeOriginal: `time` less this is UTC
   std::string make, model, lens;
 };
 
@@ -123,8 +125,8 @@ LUMIHULL_API std::string encode_jpeg(const Image& image, int quality = 92);
 /// The picture turned as EXIF orientation 1 … 8 asks.
 LUMIHULL_API Image oriented(const Image& image, int orientation);
 
-/// A small copy of an 8-bit picture, for people to look at: made to fit into `side` x `side` by averaging stored values;
-/// never larger.
+/// A small copy of an 8-bit picture, for people to look at: made to fit into `side` x `side` by averaging stored
+/// values; never larger.
 LUMIHULL_API Image fitted(const Image& image, int side);
 
 /// Converts type and channels: values scale by full range (255, 65535, 1.0), rounded to nearest.
