@@ -1,6 +1,7 @@
 #include "capture_devices.h"
 
 #include <lumihull/base/error.h>
+#include <lumihull/capture/camera_devices.h>
 #include <lumihull/capture/operator_robot.h>
 #include <lumihull/rig/simulated_devices.h>
 #include <poll.h>
@@ -20,14 +21,7 @@ std::string after_colon(const std::string& word) {
   return colon == std::string::npos ? "" : word.substr(colon + 1);
 }
 
-/// What the simulated devices keep between two runs of the program: a folder beside the capture's.
-std::filesystem::path memory_of(const std::filesystem::path& folder) {
-  std::filesystem::path out = std::filesystem::absolute(folder).lexically_normal();
-  if (!out.has_filename()) out = out.parent_path();
-  out += ".simulated";
-  std::filesystem::create_directories(out);
-  return out;
-}
+bool begins(const std::string& word, const char* with) { return word.rfind(with, 0) == 0; }
 
 }  // namespace
 
@@ -71,27 +65,60 @@ std::string TerminalOperator::ask(const Question& question, Job& job) {
   }
 }
 
-std::unique_ptr<Robot> make_robot(const std::string& word, const std::filesystem::path& folder, Operator& who) {
+/// What the simulated devices keep between two runs of the program: a folder beside the capture's.
+std::filesystem::path Devices::memory() const {
+  std::filesystem::path out = std::filesystem::absolute(folder_).lexically_normal();
+  if (!out.has_filename()) out = out.parent_path();
+  out += ".simulated";
+  std::filesystem::create_directories(out);
+  return out;
+}
+
+std::shared_ptr<SerialLink> Devices::link(const std::string& port) {
+  std::shared_ptr<SerialLink>& link = links_[port];
+  if (!link) link = open_serial_link({.device = port});
+  return link;
+}
+
+std::unique_ptr<Robot> Devices::robot(const std::string& word, const Plan& plan) {
   if (word == "simulate")
-    return std::make_unique<rig::SimulatedRobot>(
-        rig::SimulatedRobot::Options{.memory = memory_of(folder) / "robot"});
-  if (word == "turntable") return std::make_unique<TurntableRobot>(who);
-  if (word == "hand") return std::make_unique<HandRobot>(who);
-  if (word.rfind("serial:", 0) == 0)
-    throw Error(ErrorCode::unsupported, "robots on a serial port are not in this build", after_colon(word));
+    return std::make_unique<rig::SimulatedRobot>(rig::SimulatedRobot::Options{.memory = memory() / "robot"});
+  if (word == "turntable") return std::make_unique<TurntableRobot>(who_);
+  if (word == "hand") return std::make_unique<HandRobot>(who_);
+  if (begins(word, "serial:")) {
+    if (!plan.mechanism)
+      throw Error(ErrorCode::invalid_argument, "the plan is for no mechanism with cables: `lumihull plan --mechanism`",
+                  word);
+    robot_port_ = after_colon(word);
+    return open_serial_robot(link(robot_port_), *plan.mechanism);
+  }
   throw Error(ErrorCode::invalid_argument, "expected simulate, turntable, hand or serial:PORT", word);
 }
 
-std::unique_ptr<CameraDevice> make_camera(const std::string& word, const std::string& name,
-                                          const std::filesystem::path& folder, Robot& robot, Operator& who) {
+std::unique_ptr<CameraDevice> Devices::camera(const std::string& word, const std::string& name, Robot& on) {
   if (word == "simulate")
     return std::make_unique<rig::SimulatedCamera>(
-        rig::SimulatedCamera::Options{.name = name, .list = memory_of(folder) / ("exposures-" + name), .card = {}},
-        dynamic_cast<const rig::SimulatedRobot*>(&robot));
-  if (word == "hand") return std::make_unique<OperatorCamera>(who);
-  if (word == "serial" || word == "gphoto2" || word.rfind("gphoto2:", 0) == 0 || word.rfind("folder:", 0) == 0)
-    throw Error(ErrorCode::unsupported, "cameras of this kind are not in this build", word);
-  throw Error(ErrorCode::invalid_argument, "expected simulate, hand, serial, gphoto2[:PORT] or folder:DIR", word);
+        rig::SimulatedCamera::Options{.name = name, .list = memory() / ("exposures-" + name), .card = {}},
+        dynamic_cast<const rig::SimulatedRobot*>(&on));
+  if (word == "hand") return std::make_unique<OperatorCamera>(who_);
+  if (word == "serial" || begins(word, "serial:")) {
+    const std::string port = word == "serial" ? robot_port_ : after_colon(word);
+    if (port.empty())
+      throw Error(ErrorCode::invalid_argument, "the robot has no serial port to share: expected serial:PORT", word);
+    return open_serial_camera(link(port));
+  }
+  if (word == "gphoto2") return open_gphoto_camera({}, job_);
+  if (begins(word, "gphoto2:")) return open_gphoto_camera({.port = after_colon(word)}, job_);
+  if (begins(word, "folder:")) {
+    const std::string folder = after_colon(word);
+    return watch_folder({.watched = folder, .release = [this, folder](ShotId id, double) {
+                           who_.tell("shot " + std::to_string(id) +
+                                     ": take the photograph; its file is waited for in " + folder);
+                           return true;
+                         }});
+  }
+  throw Error(ErrorCode::invalid_argument, "expected simulate, hand, serial[:PORT], gphoto2[:PORT] or folder:DIR",
+              word);
 }
 
 }  // namespace lumihull::program

@@ -5,11 +5,14 @@
 #include <lumihull/capture/operator.h>
 #include <lumihull/capture/plan.h>
 #include <lumihull/capture/robot.h>
+#include <lumihull/capture/serial.h>
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
+#include <utility>
 
 namespace lumihull::program {
 
@@ -30,14 +33,30 @@ class TerminalOperator : public capture::Operator {
   std::string typed_;
 };
 
-/// simulate, turntable, hand, serial:PORT. `folder`: the capture's, beside whose files a simulated robot remembers.
-/// Errors: invalid_argument (no such word), unsupported (not in this build), io.
-std::unique_ptr<capture::Robot> make_robot(const std::string& word, const std::filesystem::path& folder,
-                                           capture::Operator& who);
+/// Robot and cameras by their words. What names the same serial port shares one link to it.
+/// Errors: invalid_argument (no such word), not_found, io.
+class Devices {
+ public:
+  /// folder: the capture's, beside whose files simulated devices remember. who and job outlive the devices.
+  Devices(std::filesystem::path folder, capture::Operator& who, Job& job)
+      : folder_(std::move(folder)), who_(who), job_(job) {}
 
-/// simulate, hand, serial, gphoto2[:PORT], folder:DIR. `name`: the plan's; `robot`: what the camera hangs on.
-std::unique_ptr<capture::CameraDevice> make_camera(const std::string& word, const std::string& name,
-                                                   const std::filesystem::path& folder, capture::Robot& robot,
-                                                   capture::Operator& who);
+  /// simulate, turntable, hand, serial:PORT (the winches of the plan's mechanism)
+  std::unique_ptr<capture::Robot> robot(const std::string& word, const capture::Plan& plan);
+
+  /// simulate, hand, serial[:PORT] (without a port: the robot's), gphoto2[:PORT], folder:DIR. name: the plan's; on:
+  /// what the camera hangs on.
+  std::unique_ptr<capture::CameraDevice> camera(const std::string& word, const std::string& name, capture::Robot& on);
+
+ private:
+  std::shared_ptr<capture::SerialLink> link(const std::string& port);
+  std::filesystem::path memory() const;
+
+  std::filesystem::path folder_;
+  capture::Operator& who_;
+  Job& job_;
+  std::string robot_port_;
+  std::map<std::string, std::shared_ptr<capture::SerialLink>> links_;
+};
 
 }  // namespace lumihull::program
