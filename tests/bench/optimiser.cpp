@@ -1,8 +1,8 @@
 // Our CMA-ES and pagmo's on the paper's objective: 240 poses, six free attachment points (19 unknowns).
 //
-// A program of its own: pagmo's classes hold Eigen matrices that its library allocates and this program frees. Debian's
-// library is built without AVX, and Eigen's allocation depends on it, so all of this is built as if without, too
-// (EIGEN_MAX_ALIGN_BYTES), and takes nothing from Lumihull's libraries that Eigen allocated.
+// A program of its own, built without AVX: pagmo's classes hold Eigen matrices that its library allocates and this
+// program frees, Debian's library is built without AVX, and Eigen's allocation depends on it (with AVX the program
+// crashes). It takes nothing from Lumihull's libraries that Eigen allocated.
 
 #include <algorithm>
 #include <cstdio>
