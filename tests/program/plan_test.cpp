@@ -26,7 +26,7 @@ class PlanVerb : public testing::Test {
 };
 
 TEST_F(PlanVerb, PlansTheCables) {
-  const auto run = plan({"--radius", "1.5", "--steps", "12x6", "--bearing-tolerance-deg", "16", "--scatter", "200",
+  const auto run = plan({"--radius", "1.5", "--steps", "12x6", "--scatter", "200",
                          "--json", "--svg", mine("pictures"), "--kicks", "20"});
   ASSERT_EQ(run.status, 0) << run.err;
   const auto json = nlohmann::json::parse(run.out);
@@ -56,7 +56,7 @@ TEST_F(PlanVerb, PlansATurntableAndAHand) {
 }
 
 TEST_F(PlanVerb, PlansVisitsForRepeatability) {
-  const auto run = plan({"--repeatability", "3", "--center", "0,0,1"});
+  const auto run = plan({"--repeatability", "3"});
   ASSERT_EQ(run.status, 0) << run.err;
   EXPECT_EQ(capture::read_plan(mine("plan.json")).stops.size(), 100u);
   EXPECT_EQ(plan({"--repeatability", "-3"}).status, 2);

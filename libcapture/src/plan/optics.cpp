@@ -7,21 +7,18 @@
 #include <cstdio>
 #include <limits>
 
+#include "expect.h"
+
 namespace lumihull::capture {
 namespace {
+
+using internal::expect_between;
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-void expect_between(double value, double low, double high, const char* name) {
-  if (std::isfinite(value) && value >= low && value <= high) return;
-  char text[160];
-  std::snprintf(text, sizeof text, "expected a number from %g to %g, not %g", low, high, value);
-  throw Error(ErrorCode::invalid_argument, text, name);
-}
 
 std::string said(const char* format, double a, double b = 0, double c = 0) {
   char text[256];

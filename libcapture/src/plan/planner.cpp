@@ -16,22 +16,18 @@
 #include <unordered_map>
 #include <utility>
 
+#include "expect.h"
 #include "tour.h"
 #include "ways.h"
 
 namespace lumihull::capture {
 namespace {
 
+using internal::expect_between;
+
 using internal::Way;
 
 constexpr double kBlocked_s = 1e6;  // so long that any other order is preferred
-
-void expect_between(double value, double low, double high, const char* name) {
-  if (std::isfinite(value) && value >= low && value <= high) return;
-  char text[160];
-  std::snprintf(text, sizeof text, "expected a number from %g to %g, not %g", low, high, value);
-  throw Error(ErrorCode::invalid_argument, text, name);
-}
 
 /// Stops that share a bearing, and where the camera is turned to it: indices into Planner::stops_.
 struct Group {

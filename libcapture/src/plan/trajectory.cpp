@@ -8,19 +8,16 @@
 #include <cmath>
 #include <cstdio>
 
+#include "expect.h"
+
 namespace lumihull::capture {
 namespace {
+
+using internal::expect_between;
 
 using Eigen::Vector3d;
 
 constexpr double kPi = std::numbers::pi;
-
-void expect_between(double value, double low, double high, const char* name) {
-  if (std::isfinite(value) && value >= low && value <= high) return;
-  char text[160];
-  std::snprintf(text, sizeof text, "expected a number from %g to %g, not %g", low, high, value);
-  throw Error(ErrorCode::invalid_argument, text, name);
-}
 
 struct Place {
   double theta, phi;

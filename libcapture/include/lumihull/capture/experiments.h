@@ -11,7 +11,7 @@ namespace lumihull::capture {
 
 /// How well the robot comes back (paper, 5.2): `visits` rounds over the four corners of a horizontal square, in turn.
 struct RepeatabilityOptions {
-  Eigen::Vector3d center{0, 0, 1};  ///< of the square, world, m
+  Eigen::Vector3d center{0, 0, 0};  ///< of the square, world, m
   double side_m = 3;
   int visits = 25;
   double settle_s = 7, exposure_s = 0.5;
