@@ -1,5 +1,5 @@
-// lumihull capture FOLDER --plan plan.json --robot WORD --camera WORD: drives robot and cameras through a plan; the same
-// command goes on where it was stopped or killed.
+// lumihull capture FOLDER --plan plan.json --robot WORD --camera WORD: drives robot and cameras through a plan; the
+// same command goes on where it was stopped or killed.
 
 #include <lumihull/base/error.h>
 #include <lumihull/calib/lens_calibration.h>
@@ -32,8 +32,7 @@ std::map<std::string, Camera> intrinsics_of(const Arguments& a, const capture::P
   std::map<std::string, Camera> out;
   for (const std::string& word : a.intrinsics) {
     const std::size_t equals = word.find('=');
-    const Camera camera =
-        calib::load_intrinsics(equals == std::string::npos ? word : word.substr(equals + 1)).camera;
+    const Camera camera = calib::load_intrinsics(equals == std::string::npos ? word : word.substr(equals + 1)).camera;
     if (equals != std::string::npos)
       out[word.substr(0, equals)] = camera;
     else
@@ -58,7 +57,8 @@ void say_dry_run(Program& program, const capture::DryRun& found) {
               << ", \"left\": " << found.left << ", \"seconds\": " << found.seconds << "}\n";
   }
   if (!found.problems.empty())
-    throw Error(ErrorCode::bad_input, std::to_string(found.problems.size()) + " problems; nothing was moved", "dry run");
+    throw Error(ErrorCode::bad_input, std::to_string(found.problems.size()) + " problems; nothing was moved",
+                "dry run");
 }
 
 void run(Program& program, Arguments& a) {
@@ -87,8 +87,7 @@ void run(Program& program, Arguments& a) {
   }
   if (a.dry_run) return say_dry_run(program, capture::dry_run(plan, *robot, cameras, a.folder, options));
 
-  const capture::SessionResult result =
-      capture::capture(plan, *robot, cameras, a.folder, options, who, program.job());
+  const capture::SessionResult result = capture::capture(plan, *robot, cameras, a.folder, options, who, program.job());
   program.say(a.folder + ": " + std::to_string(result.views) + " of " + std::to_string(result.of) + " photographs, " +
               std::to_string(result.taken) + " taken now" +
               (result.awaited ? ", " + std::to_string(result.awaited) + " still on the camera's card" : "") +
@@ -119,7 +118,8 @@ void add_capture(Program& program) {
   verb->add_option("--settle", a->settle, "seconds to wait at each stop, instead of the plan's")
       ->check(CLI::Range(0.0, 3600.0));
   verb->add_option("--exposure", a->exposure, "seconds, instead of the plan's")->check(CLI::Range(0.0, 3600.0));
-  verb->add_option("--retries", a->options.retries, "of a shot that the camera refuses [2]")->check(CLI::Range(0, 1000));
+  verb->add_option("--retries", a->options.retries, "of a shot that the camera refuses [2]")
+      ->check(CLI::Range(0, 1000));
   verb->add_option("--least-free", a->least_free_mb, "stop where less is free on the disk, MB [200]")
       ->check(CLI::Range(0.0, 1e9));
   verb->add_option("--intrinsics", a->intrinsics, "[CAMERA=]FILE of a calibrated lens (`lumihull intrinsics`)");

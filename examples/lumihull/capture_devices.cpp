@@ -73,8 +73,7 @@ std::string TerminalOperator::ask(const Question& question, Job& job) {
 
 std::unique_ptr<Robot> make_robot(const std::string& word, const std::filesystem::path& folder, Operator& who) {
   if (word == "simulate")
-    return std::make_unique<rig::SimulatedRobot>(
-        rig::SimulatedRobot::Options{.memory = memory_of(folder) / "robot"});
+    return std::make_unique<rig::SimulatedRobot>(rig::SimulatedRobot::Options{.memory = memory_of(folder) / "robot"});
   if (word == "turntable") return std::make_unique<TurntableRobot>(who);
   if (word == "hand") return std::make_unique<HandRobot>(who);
   if (word.rfind("serial:", 0) == 0)
