@@ -1,5 +1,5 @@
-// The capture's own costs: journal events with fsync, the contact sheet of many photographs. No peer: other rigs keep no
-// journal that survives a crash.
+// The capture's own costs: journal events with fsync, the contact sheet of many photographs. No peer: other rigs keep
+// no journal that survives a crash.
 
 #include <lumihull/base/files.h>
 #include <lumihull/base/image.h>

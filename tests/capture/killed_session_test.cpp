@@ -137,14 +137,16 @@ TEST_P(Killed, At200Moments) {
   if (recalls) {
     EXPECT_EQ(twice, 0u);
   }
-  std::printf("%d kills in %d captures of %zu photographs in all, %d sessions begun, %zu doubts, %zu exposures made again, "
-              "%.0f s\n",
-              kills, captures, shots, sessions, doubts, twice,
-              std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  std::printf(
+      "%d kills in %d captures of %zu photographs in all, %d sessions begun, %zu doubts, %zu exposures made again, "
+      "%.0f s\n",
+      kills, captures, shots, sessions, doubts, twice,
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
 }
 
-INSTANTIATE_TEST_SUITE_P(Camera, Killed, testing::Values(true, false),
-                         [](const auto& camera) { return std::string(camera.param ? "ThatRecalls" : "WithoutMemory"); });
+INSTANTIATE_TEST_SUITE_P(Camera, Killed, testing::Values(true, false), [](const auto& camera) {
+  return std::string(camera.param ? "ThatRecalls" : "WithoutMemory");
+});
 
 /// Not at random: by the devices themselves, in the midst of their work.
 TEST(KilledAt, EachStepOfAShot) {

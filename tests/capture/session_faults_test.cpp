@@ -369,9 +369,7 @@ TEST(SessionFaults, CancelledWhileSettlingAndWhileExposing) {
   test::Scene scene(folder.path(), test::turntable_plan(4));
   Job job;
   scene.options.settle_s = 3000;
-  scene.prepare = [&](rig::SimulatedRobot& robot, auto&) {
-    robot.on_roll = [&](double) { job.cancel(); };
-  };
+  scene.prepare = [&](rig::SimulatedRobot& robot, auto&) { robot.on_roll = [&](double) { job.cancel(); }; };
   EXPECT_EQ(test::expect_error([&] { scene.run(&job); }).code(), ErrorCode::cancelled);
   EXPECT_TRUE(scene.ended_safe);
   EXPECT_EQ(scene.state().last, EventKind::stopped);

@@ -105,14 +105,14 @@ SessionResult Scene::run(Job* job) {
   std::vector<rig::SimulatedCamera*> simulated;
   std::vector<CameraDevice*> devices;
   for (const std::string& name : plan.cameras) {
-    cameras.push_back(std::make_unique<rig::SimulatedCamera>(
-        rig::SimulatedCamera::Options{.name = name,
-                                      .list = memory / ("exposures-" + name),
-                                      .recalls = recalls,
-                                      .delivers = delivers,
-                                      .card = memory / "card",
-                                      .time_scale = 1},
-        &robot));
+    cameras.push_back(
+        std::make_unique<rig::SimulatedCamera>(rig::SimulatedCamera::Options{.name = name,
+                                                                             .list = memory / ("exposures-" + name),
+                                                                             .recalls = recalls,
+                                                                             .delivers = delivers,
+                                                                             .card = memory / "card",
+                                                                             .time_scale = 1},
+                                               &robot));
     simulated.push_back(cameras.back().get());
     devices.push_back(cameras.back().get());
   }

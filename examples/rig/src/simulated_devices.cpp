@@ -100,7 +100,8 @@ std::string SimulatedCamera::picture(ShotId id, const std::string& stop) const {
   for (const char c : options_.name + "/" + stop) seed = mixed(seed ^ std::uint8_t(c));
   Image image(options_.width, options_.height, 3);
   const int side = std::max(4, options_.width / 12);
-  const int blot_x = int(seed % std::uint32_t(options_.width)), blot_y = int(mixed(seed) % std::uint32_t(options_.height));
+  const int blot_x = int(seed % std::uint32_t(options_.width)),
+            blot_y = int(mixed(seed) % std::uint32_t(options_.height));
   for (int y = 0; y < image.height(); ++y)
     for (int x = 0; x < image.width(); ++x)
       for (int c = 0; c < 3; ++c) {

@@ -4,7 +4,6 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/import.h>
 #include <lumihull/capture/session.h>
-
 #include <sys/stat.h>
 
 #include <map>
@@ -32,7 +31,8 @@ std::int64_t modified_ns(const fs::path& file) {
 
 class Entries {
  public:
-  Entries(Capture& capture, const Plan& plan, const JournalState& state, const std::map<std::string, Camera>& intrinsics)
+  Entries(Capture& capture, const Plan& plan, const JournalState& state,
+          const std::map<std::string, Camera>& intrinsics)
       : capture_(capture), plan_(plan), state_(state), intrinsics_(intrinsics) {}
 
   void run() {

@@ -27,10 +27,10 @@ using lumihull::internal::html_escaped;
 using lumihull::internal::Json;
 using lumihull::internal::JsonReader;
 
-constexpr int kSide = 220;             ///< of a thumbnail, px
-constexpr int kLookedAt = 1200;        ///< longer side of the picture that is judged, at least, px
-constexpr double kClipped = 0.02;      ///< more of a picture is not right
-constexpr double kDark = 90;           ///< 99 % of the pixels below
+constexpr int kSide = 220;                         ///< of a thumbnail, px
+constexpr int kLookedAt = 1200;                    ///< longer side of the picture that is judged, at least, px
+constexpr double kClipped = 0.02;                  ///< more of a picture is not right
+constexpr double kDark = 90;                       ///< 99 % of the pixels below
 constexpr double kBlurred = 1.7, kBlurred_px = 4;  ///< edges so much wider than usual, and at least so wide
 constexpr int kReload_s = 5;
 
@@ -75,7 +75,8 @@ Word word(const ShotProgress& shot) {
 std::string url(const std::string& path) {
   std::string out;
   for (const char c : path) {
-    const bool plain = std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' || c == '.' || c == '/' || c == '~';
+    const bool plain =
+        std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' || c == '.' || c == '/' || c == '~';
     char code[4];
     std::snprintf(code, sizeof code, "%%%02X", unsigned(static_cast<unsigned char>(c)));
     out += plain ? std::string(1, c) : code;
@@ -140,9 +141,9 @@ void ContactSheet::write_cache() const {
                     {"brightest", t.brightest},
                     {"edge_width_px", t.edge_width_px}});
   const fs::path file = folder_ / "thumbs" / "thumbs.json";
-  write_file(file, lumihull::internal::print_json(
-                       {{"format", "lumihull-thumbnails"}, {"version", 1}, {"thumbnails", std::move(list)}},
-                       file.string()));
+  write_file(file,
+             lumihull::internal::print_json(
+                 {{"format", "lumihull-thumbnails"}, {"version", 1}, {"thumbnails", std::move(list)}}, file.string()));
 }
 
 const ContactSheet::Thumbnail& ContactSheet::thumbnail(const Take& take) {
@@ -251,8 +252,8 @@ void ContactSheet::write(const Plan& plan, const JournalState& state, const std:
 
 }  // namespace internal
 
-void write_contact_sheet(const fs::path& folder, const Plan& plan, const JournalState& state,
-                         const std::string& status, double seconds_left) {
+void write_contact_sheet(const fs::path& folder, const Plan& plan, const JournalState& state, const std::string& status,
+                         double seconds_left) {
   internal::ContactSheet(folder).write(plan, state, status, seconds_left);
 }
 

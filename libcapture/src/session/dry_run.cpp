@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t kMostNamed = 5;  ///< problems of one kind that are told one by one
+constexpr std::size_t kMostNamed = 5;      ///< problems of one kind that are told one by one
 constexpr double kBytesAPhotograph = 8e6;  ///< of the paper's camera: 6 megapixels, JPEG or RAW
 
 class Checks {
@@ -88,8 +88,7 @@ class Checks {
         complain(stop.name + ": " + *obstacle);
       if (i == 0) continue;
       const PlannedStop& before = plan_.stops[i - 1];
-      if (const auto obstacle =
-              internal::obstacle_between(plan_, before.world_from_platform, stop.world_from_platform))
+      if (const auto obstacle = internal::obstacle_between(plan_, before.world_from_platform, stop.world_from_platform))
         complain("from " + before.name + " to " + stop.name + ": " + *obstacle);
     }
     if (bad > kMostNamed) problem("and " + std::to_string(bad - kMostNamed) + " more stops or ways like these");
@@ -100,7 +99,8 @@ class Checks {
     std::error_code error;
     while (!fs::exists(existing, error) && existing.has_relative_path()) existing = existing.parent_path();
     if (!fs::is_directory(existing, error)) return problem(existing.string() + ": a file is in the way of the folder");
-    if (::faccessat(AT_FDCWD, existing.c_str(), W_OK | X_OK, AT_EACCESS) != 0) problem(existing.string() + ": the folder can't be written to");
+    if (::faccessat(AT_FDCWD, existing.c_str(), W_OK | X_OK, AT_EACCESS) != 0)
+      problem(existing.string() + ": the folder can't be written to");
 
     std::optional<JournalState> state;
     attempt([&] { state = internal::stored_state(folder_, plan_); });
@@ -115,7 +115,8 @@ class Checks {
         problem(folder_.string() + ": holds a capture that was not begun by `capture`; name another folder");
     } else {
       note("goes on: " + std::to_string(state->views()) + " photographs are there");
-      if (!options_.names.empty() && options_.names != state->head.name_template && options_.names != SessionOptions{}.names)
+      if (!options_.names.empty() && options_.names != state->head.name_template &&
+          options_.names != SessionOptions{}.names)
         note("photographs are named by the template that the capture was begun with: " + state->head.name_template);
     }
     if (!options_.retake.empty()) {

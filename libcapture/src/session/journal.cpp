@@ -24,7 +24,8 @@ namespace {
 constexpr std::size_t kMostBytes = std::size_t(1) << 30;
 
 [[noreturn]] void fail(const std::string& what, int error, const fs::path& file) {
-  throw Error(error == ENOENT ? ErrorCode::not_found : ErrorCode::io, what + ": " + std::strerror(error), file.string());
+  throw Error(error == ENOENT ? ErrorCode::not_found : ErrorCode::io, what + ": " + std::strerror(error),
+              file.string());
 }
 
 std::string now() {
@@ -39,8 +40,8 @@ std::string now() {
   return text;
 }
 
-/// Devices' and operators' words may be anything; the journal takes what can be read back: as Error has it, UTF-8 on one
-/// line.
+/// Devices' and operators' words may be anything; the journal takes what can be read back: as Error has it, UTF-8 on
+/// one line.
 std::string printable(const std::string& text) {
   constexpr std::size_t kMost = 4000;
   return Error(ErrorCode::internal, text.substr(0, kMost)).message();
@@ -131,8 +132,7 @@ void Journal::write_line(const std::string& line) {
   };
   std::size_t written = 0;
   while (written < line.size()) {
-    const ssize_t n =
-        ::pwrite(descriptor_, line.data() + written, line.size() - written, off_t(length_ + written));
+    const ssize_t n = ::pwrite(descriptor_, line.data() + written, line.size() - written, off_t(length_ + written));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) undo("can't write the journal", errno);
     written += std::size_t(n);

@@ -13,9 +13,9 @@ using lumihull::internal::JsonReader;
 
 namespace {
 
-constexpr const char* kKinds[] = {"begin",   "session", "consent", "moving", "arrived", "declared",
-                                  "firing",  "done",    "refused", "unknown", "decided", "file",
-                                  "retake",  "fault",   "paused",  "stopped", "finished"};
+constexpr const char* kKinds[] = {"begin",  "session", "consent", "moving",  "arrived", "declared",
+                                  "firing", "done",    "refused", "unknown", "decided", "file",
+                                  "retake", "fault",   "paused",  "stopped", "finished"};
 constexpr std::size_t kSumDigits = 16;
 constexpr std::string_view kSumField = ",\"sum\":\"";
 constexpr std::size_t kTail = kSumField.size() + kSumDigits + 2;  // with "}
@@ -202,7 +202,8 @@ std::vector<ShotProgress> planned_shots(const JournalHead& head) {
 void check(const JournalHead& head) {
   for (const auto* names : {&head.stops, &head.cameras}) {
     const char* what = names == &head.stops ? "stop" : "camera";
-    if (names->empty()) throw Error(ErrorCode::invalid_argument, std::string("expected at least one ") + what, "journal");
+    if (names->empty())
+      throw Error(ErrorCode::invalid_argument, std::string("expected at least one ") + what, "journal");
     std::set<std::string_view> seen;
     for (const std::string& name : *names)
       if (name.empty() || !seen.insert(name).second)

@@ -117,7 +117,8 @@ class Applier {
     if (camera == cameras.end()) fail("a camera of the plan, found \"" + event_.camera + "\"");
     const std::size_t index = state_.index(stop(), std::size_t(camera - cameras.begin()));
     ShotProgress& shot = state_.shots[index];
-    if (shot.step != ShotStep::waiting && shot.step != ShotStep::refused) fail("a photograph that is still to be taken");
+    if (shot.step != ShotStep::waiting && shot.step != ShotStep::refused)
+      fail("a photograph that is still to be taken");
     const bool again = shot.step == ShotStep::refused;
     if (again ? event_.shot != shot.take.shot : event_.shot <= state_.last_id)
       fail(again ? "the number of the refused shot" : "a new number");

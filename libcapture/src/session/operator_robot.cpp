@@ -67,10 +67,10 @@ void HandRobot::move_to(const PlannedStop& stop, Job& job) {
 void HandRobot::set_roll(double roll_rad, Job& job) { ask_for_roll(who_, roll_rad, job); }
 
 ShotOutcome OperatorCamera::shoot(ShotId id, double, const std::filesystem::path&, Job& job) {
-  const std::string answer =
-      who_.ask({Question::About::task, "press the shutter once (picture " + std::to_string(id) + ")",
-                     {"taken", "not taken", "unsure"}},
-                    job);
+  const std::string answer = who_.ask({Question::About::task,
+                                       "press the shutter once (picture " + std::to_string(id) + ")",
+                                       {"taken", "not taken", "unsure"}},
+                                      job);
   if (answer == "taken") return {ShotState::done, {}, {}};
   if (answer == "not taken") return {ShotState::refused, {}, "the operator says so"};
   return {ShotState::unknown, {}, "the operator is not sure"};

@@ -86,7 +86,8 @@ void remove_if_empty(const fs::path& folder) { ::rmdir(folder.c_str()); }
 /// developing one takes seconds.
 void check_picture(const fs::path& file) {
   std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
   if (extension == ".jpg" || extension == ".jpeg" || extension == ".png")
     read_image(file, {.reduction = 8});
   else
@@ -123,13 +124,14 @@ std::vector<std::string> photograph_names(const JournalHead& head) {
       if (name.empty() || name.size() > 180 || name.front() == '.' || name.find('/') != std::string::npos ||
           Error(ErrorCode::internal, name).message() != name || like_a_retake(name))
         throw Error(ErrorCode::bad_input,
-                    "expected plain file names in UTF-8 that don't begin with '.' or end in ~ and a number, found \"" + name + "\"",
+                    "expected plain file names in UTF-8 that don't begin with '.' or end in ~ and a number, found \"" +
+                        name + "\"",
                     text);
       if (const auto [other, is_new] = taken.emplace(name, title); !is_new)
-        throw Error(ErrorCode::bad_input,
-                    "gives the name \"" + name + "\" to " + other->second + " and to " + title +
-                        ": add {stop} or {camera}",
-                    text);
+        throw Error(
+            ErrorCode::bad_input,
+            "gives the name \"" + name + "\" to " + other->second + " and to " + title + ": add {stop} or {camera}",
+            text);
       names.push_back(name);
     }
   return names;
@@ -182,8 +184,8 @@ std::string land_photograph(Journal& journal, const fs::path& folder, ShotId id,
   const auto found = state.by_id.find(id);
   if (found == state.by_id.end() || state.shots[found->second].take.shot != id ||
       state.shots[found->second].step != ShotStep::done)
-    throw Error(ErrorCode::invalid_argument, "expected a shot that was taken and has no file yet, found " +
-                    std::to_string(id), "shot");
+    throw Error(ErrorCode::invalid_argument,
+                "expected a shot that was taken and has no file yet, found " + std::to_string(id), "shot");
   const ShotProgress& shot = state.shots[found->second];
   check_picture(file);
 
@@ -215,8 +217,7 @@ std::string land_photograph(Journal& journal, const fs::path& folder, ShotId id,
   take.file = name;
   take.size = fs::file_size(source);
   take.sha256 = sha256_of_file(source);
-  journal.append(
-      {.kind = EventKind::file, .shot = id, .file = take.file, .sha256 = take.sha256, .size = take.size});
+  journal.append({.kind = EventKind::file, .shot = id, .file = take.file, .sha256 = take.sha256, .size = take.size});
   put_in_place(folder, take);
   return name;
 }

@@ -12,7 +12,8 @@
 namespace lumihull::capture::internal {
 
 /// The photographs' names, without extension, as JournalState::shots; empty where nothing is photographed.
-/// Error{bad_input}: an unknown field in braces, no plain file name, names used twice, a name that looks like a retake's.
+/// Error{bad_input}: an unknown field in braces, no plain file name, names used twice, a name that looks like a
+/// retake's.
 std::vector<std::string> photograph_names(const JournalHead& head);
 
 /// Where a shot's file arrives: a folder of its own, so that what is in it tells that the exposure was made.

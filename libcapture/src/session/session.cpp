@@ -56,8 +56,15 @@ class Session {
  public:
   Session(const Plan& plan, Robot& robot, std::span<CameraDevice* const> cameras, const fs::path& folder,
           const SessionOptions& options, Operator& who, Job& job, Journal& journal)
-      : plan_(plan), robot_(robot), cameras_(cameras), folder_(folder), options_(options), who_(who), job_(job),
-        journal_(journal), sheet_(folder) {}
+      : plan_(plan),
+        robot_(robot),
+        cameras_(cameras),
+        folder_(folder),
+        options_(options),
+        who_(who),
+        job_(job),
+        journal_(journal),
+        sheet_(folder) {}
 
   SessionResult run() {
     journal_.append({.kind = EventKind::session, .text = description()});
@@ -112,8 +119,8 @@ class Session {
 
   std::string description() const {
     char text[160];
-    std::snprintf(text, sizeof text, "; retries %d%s%s", options_.retries, options_.retake.empty() ? "" : "; retake of ",
-                  options_.retake.c_str());
+    std::snprintf(text, sizeof text, "; retries %d%s%s", options_.retries,
+                  options_.retake.empty() ? "" : "; retake of ", options_.retake.c_str());
     std::string out = (options_.devices.empty() ? "robot " + plan_.robot : options_.devices) + text;
     if (options_.settle_s) out += "; settle " + std::to_string(*options_.settle_s) + " s";
     if (options_.exposure_s) out += "; exposure " + std::to_string(*options_.exposure_s) + " s";
@@ -167,7 +174,8 @@ class Session {
     }
     if (shot.step == ShotStep::landed && !internal::put_in_place(folder_, shot.take)) {
       const std::string title = "photos/" + shot.take.file + " landed, but is gone or was changed";
-      ask({Question::About::doubt, title + ": photograph " + plan_.stops[i / cameras()].name + " again?",
+      ask({Question::About::doubt,
+           title + ": photograph " + plan_.stops[i / cameras()].name + " again?",
            {"again", "stop"}});
       journal_.append({.kind = EventKind::retake, .stop = plan_.stops[i / cameras()].name, .text = title});
     }
@@ -190,15 +198,16 @@ class Session {
       if (!outcome.file.empty()) land_photograph(journal_, folder_, id, outcome.file);
     } else {
       if (state().shots[i].step == ShotStep::firing)
-        journal_.append({.kind = EventKind::unknown, .shot = id, .text = outcome.detail.empty() ? why : outcome.detail});
+        journal_.append(
+            {.kind = EventKind::unknown, .shot = id, .text = outcome.detail.empty() ? why : outcome.detail});
       decide(i, "whether " + title(i) + " (shot " + std::to_string(id) + ") was taken is not known: " + why);
     }
   }
 
   void decide(std::size_t i, const std::string& text) {
     const ShotId id = state().shots[i].take.shot;
-    const std::string answer = ask({Question::About::doubt, text + ". Photograph it again, or was it taken?",
-                                    {"again", "taken", "stop"}});
+    const std::string answer =
+        ask({Question::About::doubt, text + ". Photograph it again, or was it taken?", {"again", "taken", "stop"}});
     journal_.append({.kind = EventKind::decided, .shot = id, .answer = answer});
   }
 
@@ -227,7 +236,8 @@ class Session {
     keep_out_first_ = begun;
     char text[240];
     std::snprintf(text, sizeof text, "%s: %zu photographs to take, about %.0f min. The robot will move%s%s; first to ",
-                  begun ? "go on" : "begin", left(), std::ceil(planned_seconds_left() / 60), at_ || between_ ? " from " : "",
+                  begun ? "go on" : "begin", left(), std::ceil(planned_seconds_left() / 60),
+                  at_ || between_ ? " from " : "",
                   at_        ? plan_.stops[*at_].name.c_str()
                   : between_ ? "a place between two stops"
                              : "");
@@ -236,7 +246,8 @@ class Session {
 
   void declare(std::size_t next) {
     Question question{Question::About::position,
-                      "the robot's position is not known. Drive the platform to one of these stops, and say which", {}};
+                      "the robot's position is not known. Drive the platform to one of these stops, and say which",
+                      {}};
     const auto offer = [&](std::size_t stop) {
       if (std::find(question.choices.begin(), question.choices.end(), plan_.stops[stop].name) == question.choices.end())
         question.choices.push_back(plan_.stops[stop].name);
@@ -356,8 +367,8 @@ class Session {
           fs::remove(incoming, error);  // nothing came: only where it is empty
           if (refusals++ >= options_.retries)
             throw Error(ErrorCode::io,
-                        "the camera refused " + std::to_string(refusals) + " times: " +
-                            (outcome.detail.empty() ? "no reason given" : outcome.detail),
+                        "the camera refused " + std::to_string(refusals) +
+                            " times: " + (outcome.detail.empty() ? "no reason given" : outcome.detail),
                         title(i));
           wait(options_.retry_after_s, job_);
           break;
@@ -428,11 +439,11 @@ SessionResult capture(const Plan& plan, Robot& robot, std::span<CameraDevice* co
   const SafeEnd safe_end(robot, cameras);
   const DryRun checked = dry_run(plan, robot, cameras, folder, options);
   if (!checked.problems.empty())
-    throw Error(ErrorCode::bad_input,
-                checked.problems.front() + (checked.problems.size() > 1
-                                                ? " (and " + std::to_string(checked.problems.size() - 1) + " more)"
-                                                : ""),
-                "dry run");
+    throw Error(
+        ErrorCode::bad_input,
+        checked.problems.front() +
+            (checked.problems.size() > 1 ? " (and " + std::to_string(checked.problems.size() - 1) + " more)" : ""),
+        "dry run");
   for (const std::string& note : checked.notes) who.tell(note);
   const SessionLock lock(folder);
   Journal journal = internal::stored_state(folder, plan) ? Journal::open(journal_path(folder))

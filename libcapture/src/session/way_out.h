@@ -21,7 +21,8 @@ std::optional<std::string> obstacle_between(const Plan& plan, const Pose& from, 
 std::optional<std::string> obstacle_at(const Plan& plan, const Pose& pose);
 
 /// The pose of a platform that was stopped between two stops, from its lengths; nullopt: they fit no place nearby.
-std::optional<Pose> pose_between(const Plan& plan, std::size_t from, std::size_t to, const std::vector<double>& lengths_m);
+std::optional<Pose> pose_between(const Plan& plan, std::size_t from, std::size_t to,
+                                 const std::vector<double>& lengths_m);
 
 /// The stop of the plan whose lengths are these (within 5 mm each); nullopt: none.
 std::optional<std::size_t> stop_of_lengths(const Plan& plan, const std::vector<double>& lengths_m);

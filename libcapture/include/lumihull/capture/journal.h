@@ -31,23 +31,25 @@ enum class EventKind : std::uint8_t {
   file,      ///< the photograph's name, size and digest; written before the file is put in its place
   retake,    ///< a stop is to be photographed once more
   fault,     ///< what went wrong, in words
-  paused, stopped, finished,  ///< how a session ended; a killed one has no such line
+  paused,
+  stopped,
+  finished,  ///< how a session ended; a killed one has no such line
 };
 
 /// One line. Which members count depends on the kind; the others are left as they are here.
 struct JournalEvent {
   EventKind kind = EventKind::session;
-  std::string time{};                  ///< ISO 8601, UTC, milliseconds; set by `append`
-  std::string stop{};                  ///< moving, arrived, declared, firing, retake
-  std::string camera{};                ///< firing
-  ShotId shot = 0;                   ///< firing, done, refused, unknown, decided, file
-  double settle_s = 0;               ///< firing
-  double exposure_s = 0;             ///< firing
-  std::vector<double> lengths_m{};     ///< firing: of the cables, as commanded
-  std::string file{}, sha256{};          ///< file: its name in photos/
-  std::uint64_t size = 0;            ///< file
-  std::string answer{};                ///< consent, decided
-  std::string text{};                  ///< session, consent (the question), refused, unknown, retake, fault, stopped
+  std::string time{};               ///< ISO 8601, UTC, milliseconds; set by `append`
+  std::string stop{};               ///< moving, arrived, declared, firing, retake
+  std::string camera{};             ///< firing
+  ShotId shot = 0;                  ///< firing, done, refused, unknown, decided, file
+  double settle_s = 0;              ///< firing
+  double exposure_s = 0;            ///< firing
+  std::vector<double> lengths_m{};  ///< firing: of the cables, as commanded
+  std::string file{}, sha256{};     ///< file: its name in photos/
+  std::uint64_t size = 0;           ///< file
+  std::string answer{};             ///< consent, decided
+  std::string text{};               ///< session, consent (the question), refused, unknown, retake, fault, stopped
 };
 
 /// What the first line says.
@@ -85,7 +87,7 @@ struct Take {
 struct ShotProgress {
   ShotStep step = ShotStep::waiting;
   Take take{};                 ///< the latest; shot = 0 before the first
-  std::vector<Take> landed{};///< all whose files landed, oldest first; the newest is the view
+  std::vector<Take> landed{};  ///< all whose files landed, oldest first; the newest is the view
   std::string detail{};        ///< why, for refused and unknown
 };
 
@@ -94,7 +96,7 @@ struct LUMIHULL_API JournalState {
   JournalHead head;
   std::vector<ShotProgress> shots;  ///< head.stops.size() x head.cameras.size(), a stop's cameras side by side
   std::map<ShotId, std::size_t> by_id;
-  std::set<std::string> files;      ///< every name that was ever given
+  std::set<std::string> files;  ///< every name that was ever given
   ShotId last_id = 0;
   std::optional<std::size_t> at_stop;     ///< where the robot is, or was last sent to
   std::optional<std::size_t> arrived_at;  ///< where it last was for certain

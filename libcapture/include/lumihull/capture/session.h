@@ -23,15 +23,15 @@ struct SessionOptions {
   /// Names of photographs: {stop}, {camera} and {number} (of the stop in the plan, four digits). A retake's file is
   /// NAME~2, NAME~3, … Kept from the first session on.
   std::string names = "{stop}-{camera}";
-  std::optional<double> settle_s, exposure_s;  ///< instead of the plan's
-  int retries = 2;              ///< of a refused shot, in a session
-  double retry_after_s = 1;     ///< a camera may be busy
-  std::string retake;           ///< a stop's name: photograph it once more, and nothing else
-  std::size_t pause_after = 0;  ///< photographs; 0: go on to the end
+  std::optional<double> settle_s, exposure_s;    ///< instead of the plan's
+  int retries = 2;                               ///< of a refused shot, in a session
+  double retry_after_s = 1;                      ///< a camera may be busy
+  std::string retake;                            ///< a stop's name: photograph it once more, and nothing else
+  std::size_t pause_after = 0;                   ///< photographs; 0: go on to the end
   std::uint64_t least_free_bytes = 200'000'000;  ///< on the folder's disk, before each shot
-  double page_every_s = 5;      ///< contact.html and capture.json, while it goes on
-  std::map<std::string, Camera> intrinsics;  ///< by the plan's camera names, where they are known
-  std::string devices;          ///< words for the journal: which robot, which cameras
+  double page_every_s = 5;                       ///< contact.html and capture.json, while it goes on
+  std::map<std::string, Camera> intrinsics;      ///< by the plan's camera names, where they are known
+  std::string devices;                           ///< words for the journal: which robot, which cameras
 };
 
 /// What was found before anything moves.
@@ -54,9 +54,9 @@ struct SessionResult {
   bool paused = false;
 };
 
-/// Carries out a plan, or goes on with it, in the plan's order: moves, waits until the camera hangs still, releases each
-/// camera, puts the photographs into `folder`. After a killed session the same call goes on: no view is lost, none is
-/// taken twice unless the operator says so.
+/// Carries out a plan, or goes on with it, in the plan's order: moves, waits until the camera hangs still, releases
+/// each camera, puts the photographs into `folder`. After a killed session the same call goes on: no view is lost, none
+/// is taken twice unless the operator says so.
 ///
 /// cameras: as many as plan.cameras, in that order. The folder becomes a capture (capture.json) as soon as the first
 /// photograph is there; contact.html shows how far it is. However it ends, robot and cameras are made safe.
@@ -65,8 +65,8 @@ struct SessionResult {
 /// io (disk, device, another process at work here), invalid_argument (a question that nobody answers, "stop" answered),
 /// cancelled (an exposure under way is waited for).
 LUMIHULL_API SessionResult capture(const Plan& plan, Robot& robot, std::span<CameraDevice* const> cameras,
-                                   const std::filesystem::path& folder, const SessionOptions& options,
-                                   Operator& who, Job& job);
+                                   const std::filesystem::path& folder, const SessionOptions& options, Operator& who,
+                                   Job& job);
 
 // ---- parts of it, for whoever brings files afterwards ---------------------------------------------------------------
 
