@@ -108,7 +108,12 @@ std::unique_ptr<CameraDevice> Devices::camera(const std::string& word, const std
     return open_serial_camera(link(port));
   }
   if (word == "gphoto2") return open_gphoto_camera({}, job_);
-  if (begins(word, "gphoto2:")) return open_gphoto_camera({.port = after_colon(word)}, job_);
+  if (begins(word, "gphoto2:")) {
+    GphotoOptions options;
+    options.port = after_colon(word);
+    if (begins(options.port, "ptpip:")) options.model = "PTP/IP Camera";  // only USB tells its cameras
+    return open_gphoto_camera(options, job_);
+  }
   if (begins(word, "folder:")) {
     const std::string folder = after_colon(word);
     return watch_folder({.watched = folder, .release = [this, folder](ShotId id, double) {
