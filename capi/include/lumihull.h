@@ -589,6 +589,7 @@ LH_API lh_status lh_mask_iou(lh_context *ctx, const uint8_t *a, const uint8_t *b
 }
 #endif
 
-#include <lumihull_calib.h> /* targets, resection, lens calibration */
+#include <lumihull_calib.h>   /* targets, resection, lens calibration */
+#include <lumihull_capture.h> /* the robot: mechanism, plan */
 
 #endif

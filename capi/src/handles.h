@@ -10,6 +10,8 @@
 #include <lumihull/calib/lens_calibration.h>
 #include <lumihull/calib/target_model.h>
 #include <lumihull/calib/target_set.h>
+#include <lumihull/capture/mechanism_calibration.h>
+#include <lumihull/capture/planner.h>
 #include <lumihull/hull/mesh.h>
 #include <lumihull/hull/ray_scene.h>
 
@@ -59,4 +61,17 @@ struct lh_target_model {
 
 struct lh_ink_samples {
   lumihull::calib::InkSamples value;
+};
+
+struct lh_mechanism {
+  lumihull::capture::Mechanism value;
+};
+
+struct lh_mechanism_calibration {
+  lumihull::capture::MechanismCalibration value;
+};
+
+struct lh_plan {
+  lumihull::capture::PlannedTour value;
+  lumihull::capture::PoseLimits limits;  ///< that it was made with
 };

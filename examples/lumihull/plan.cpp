@@ -106,40 +106,6 @@ HemisphereOptions views_of(const Arguments& a, double radius) {
   return views;
 }
 
-/// The object on its pedestal: from the floor to its top.
-KeepOut keep_out(const Arguments& a, const HemisphereOptions& views, double floor) {
-  const double height = a.object.height_m > 0 ? a.object.height_m : a.object.diameter_m;
-  const double radius = 0.5 * a.object.diameter_m;
-  KeepOut object;
-  object.radius_m = radius;
-  object.base = {views.center.x(), views.center.y(), std::min(floor, views.center.z() - 0.5 * height)};
-  // A sphere ends in the cap; a cylinder's flat top lies below one.
-  object.height_m = views.center.z() + (a.object.height_m > 0 ? 0.5 * height : 0) - object.base.z();
-  return object;
-}
-
-/// On a turntable or in a hand: the views in order, moves of one duration.
-PlannedTour plan_views(const Arguments& a, const HemisphereOptions& views) {
-  PlannedTour tour;
-  tour.plan.robot = a.robot;
-  tour.plan.cameras = words(a.cameras);
-  tour.plan.stops = hemisphere_views(views, orientation_of(a));
-  const double travel = a.travel >= 0 ? a.travel : a.robot == "hand" ? 10 : 3;
-  for (std::size_t i = 1; i < tour.plan.stops.size(); ++i) {
-    PlannedStop &stop = tour.plan.stops[i], &last = tour.plan.stops[i - 1];
-    stop.travel_s = travel;
-    tour.travel_s += travel;
-    tour.travel_m += (stop.world_from_platform.translation - last.world_from_platform.translation).norm();
-    if (a.robot == "turntable" && stop.phi_rad != last.phi_rad) {
-      char text[120];
-      std::snprintf(text, sizeof text, "Move the camera to %.1f degrees from straight above.", stop.phi_rad / kDegree);
-      stop.pause = text;
-    }
-  }
-  check(tour.plan);
-  return tour;
-}
-
 std::string formatted(const char* format, double x, double y = 0, double z = 0) {
   char text[240];
   std::snprintf(text, sizeof text, format, x, y, z);
@@ -291,7 +257,7 @@ void run(Program& program, const Arguments& a) {
     const Mechanism mechanism = a.mechanism == "paper" ? paper_mechanism() : read_mechanism(a.mechanism);
     PlannerOptions options;
     options.limits.clearance_m = a.clearance;
-    options.object = keep_out(a, views, mechanism.room.min().z());
+    options.object = standing_object(a.object, views.center, mechanism.room.min().z());
     options.cameras = words(a.cameras);
     options.pictures_per_battery = a.battery;
     options.kicks = a.kicks, options.seed = a.seed;
@@ -299,7 +265,8 @@ void run(Program& program, const Arguments& a) {
     tour = a.raster ? straight : plan_tour(mechanism, views, options, program.job());
     if (!a.raster && straight.left_out.size() == tour.left_out.size()) raster = {straight.travel_m, straight.travel_s};
   } else {
-    tour = plan_views(a, views);
+    const double travel = a.travel >= 0 ? a.travel : a.robot == "hand" ? 10 : 3;
+    tour = view_tour(a.robot, views, orientation_of(a), words(a.cameras), travel);
   }
   std::vector<PlacedTarget> targets;
   if (!a.targets.empty()) {

@@ -32,6 +32,13 @@ constexpr int kLeastTargets = 5;
 LUMIHULL_API PlanReport report(const Plan& plan, const Camera& camera, const ObjectSize& object,
                                const Eigen::Vector3d& center, std::span<const PlacedTarget> targets = {});
 
+/// Stops of a plan that its mechanism can't take, and straight ways between them that it can't go: obstacles that
+/// `judge_pose` and the planner would find, in words. Empty where all is well, and without a mechanism.
+LUMIHULL_API std::vector<std::string> plan_problems(const Plan& plan, const PoseLimits& limits = {});
+
+/// Figures, what was left out and why, notes, and `plan_problems`, as one JSON object.
+LUMIHULL_API std::string describe_json(const PlannedTour& tour, const PoseLimits& limits = {});
+
 /// Pictures of a plan as SVG files of their own. From above and from the side the path with its stops, by time from
 /// dark to light, cables' departures, object and room; the cables' tensions along the plan; when it is where.
 LUMIHULL_API std::string plan_from_above_svg(const Plan& plan);

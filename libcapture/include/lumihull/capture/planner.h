@@ -100,4 +100,12 @@ LUMIHULL_API PlannedTour plan_tour(const Mechanism& mechanism, const HemisphereO
 LUMIHULL_API PlannedTour raster_tour(const Mechanism& mechanism, const HemisphereOptions& views,
                                      const PlannerOptions& options, Job& job);
 
+/// Without a mechanism: `hemisphere_views` in their order on a "turntable" or in a "hand", travel_s between neighbours.
+/// Where a turntable's camera has to be moved the operator is asked to. Errors: invalid_argument, bad_input (cameras).
+LUMIHULL_API PlannedTour view_tour(const std::string& robot, const HemisphereOptions& views, Orientation orientation,
+                                   const std::vector<std::string>& cameras, double travel_s);
+
+/// What must not be touched of an object that stands on the floor, or on a pedestal as wide as it is.
+LUMIHULL_API KeepOut standing_object(const ObjectSize& object, const Eigen::Vector3d& center, double floor_m);
+
 }  // namespace lumihull::capture
