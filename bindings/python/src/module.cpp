@@ -174,4 +174,6 @@ PYBIND11_MODULE(_lumihull, module) {
   python::bind_resect(module);
   python::bind_lens(module);
   python::bind_target_model(module);
+  python::bind_mechanism(module);
+  python::bind_plan(module);
 }
