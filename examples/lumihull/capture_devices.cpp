@@ -81,8 +81,13 @@ std::shared_ptr<SerialLink> Devices::link(const std::string& port) {
 }
 
 std::unique_ptr<Robot> Devices::robot(const std::string& word, const Plan& plan) {
-  if (word == "simulate")
-    return std::make_unique<rig::SimulatedRobot>(rig::SimulatedRobot::Options{.memory = memory() / "robot"});
+  if (word == "simulate") {
+    const std::filesystem::path remembered = memory() / "robot";
+    const bool fresh = !std::filesystem::exists(remembered);
+    auto robot = std::make_unique<rig::SimulatedRobot>(rig::SimulatedRobot::Options{.memory = remembered});
+    if (fresh && !plan.stops.empty()) robot->declare_position(plan.stops.front());  // it was made there
+    return robot;
+  }
   if (word == "turntable") return std::make_unique<TurntableRobot>(who_);
   if (word == "hand") return std::make_unique<HandRobot>(who_);
   if (begins(word, "serial:")) {

@@ -17,14 +17,14 @@ using test::coarse_light;
 
 struct HungRoom {
   Scene scene = make_scene(make_sphere(.6, 6), kGreenPaint, false, 5);
-  Camera camera = default_camera(960);
+  Camera camera = default_camera(1536);
   Hemisphere around;
   RoomTargets targets;
 
   HungRoom() {
     around.target = scene.center().cast<double>();
     around.radius = framing_distance(camera, scene.radius(), .7);
-    targets = scatter_targets(scene, camera, around.radius, {});
+    targets = scatter_targets(scene, camera, around.radius, {.circle_px = 9});
     scene.sheets = targets.prints;
   }
 };
