@@ -123,6 +123,7 @@ void Program::draw(const Progress& p) {
 int Program::run(int argc, char** argv) {
   add_import(*this);
   add_calibrate(*this);
+  add_capture(*this);
   add_key(*this);
   add_hull(*this);
   add_texture(*this);

@@ -83,6 +83,7 @@ std::string json_text(const std::string& s);  ///< s as a JSON string, with its 
 void add_import(Program& program);
 void add_export(Program& program);
 void add_calibrate(Program& program);
+void add_capture(Program& program);
 void add_key(Program& program);
 void add_hull(Program& program);
 void add_texture(Program& program);

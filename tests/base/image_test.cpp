@@ -324,5 +324,24 @@ TEST(Write, RefusesWhatTheFormatsCannotHold) {
   EXPECT_THAT(error.what(), testing::HasSubstr("/nowhere/at"));
 }
 
+TEST(Image, ReducedPicturesAreTheFullOnesAveraged) {
+  Image image(101, 67, 3);
+  for (int y = 0; y < 67; ++y)
+    for (int x = 0; x < 101; ++x)
+      for (int c = 0; c < 3; ++c) image.row<std::uint8_t>(y)[3 * x + c] = std::uint8_t(x + y / (c + 1));
+  const std::string png = encode_png(image), jpeg = encode_jpeg(image, 98);
+  for (const int n : {1, 2, 4, 8})
+    for (const std::string* file : {&png, &jpeg}) {
+      const Image small = decode_image(std::as_bytes(std::span(*file)), "picture", {.channels = 3, .reduction = n});
+      ASSERT_EQ(small.width(), (101 + n - 1) / n);
+      ASSERT_EQ(small.height(), (67 + n - 1) / n);
+      for (int y = 0; y + 1 < small.height(); ++y)
+        for (int x = 0; x + 1 < small.width(); ++x)
+          EXPECT_NEAR(small.row<std::uint8_t>(y)[3 * x], n * (x + y) + (n - 1), 4.0);
+    }
+  EXPECT_EQ(expect_error([&] { decode_image(std::as_bytes(std::span(png)), "picture", {.reduction = 3}); }).code(),
+            ErrorCode::invalid_argument);
+}
+
 }  // namespace
 }  // namespace lumihull

@@ -51,6 +51,14 @@ Capture Capture::create(const fs::path& folder) {
   return Capture(folder);
 }
 
+Capture Capture::create_among(const fs::path& folder) {
+  std::error_code error;
+  if (fs::exists(folder / "capture.json", error))
+    throw Error(ErrorCode::invalid_argument, "the folder already holds a capture", folder.string());
+  internal::make_folder(folder);
+  return Capture(folder);
+}
+
 Capture Capture::open(const fs::path& folder) {
   const fs::path main = folder / "capture.json", cameras = folder / "cameras.json";
   std::error_code error;

@@ -29,6 +29,36 @@ std::string read_digest(const JsonReader& json) {
   return digest;
 }
 
+CommandedShot read_commanded(const JsonReader& json) {
+  CommandedShot c;
+  c.stop = read_name(json.at("stop"));
+  c.device = read_name(json.at("camera"));
+  c.id = std::uint32_t(json.at("id").integer(0, UINT32_MAX));
+  c.cam_from_world = read_pose(json.at("cam_from_world"));
+  if (json.has("lengths_m")) {
+    const JsonReader lengths = json.at("lengths_m");
+    const std::size_t n = lengths.array_size(64);
+    for (std::size_t i = 0; i < n; ++i) c.lengths_m.push_back(lengths.at(i).number());
+  }
+  c.settle_s = json.at("settle_s").number(0);
+  c.exposure_s = json.at("exposure_s").number(0);
+  c.attempts = int(json.at("attempts").integer(1, INT32_MAX));
+  c.plan_sha256 = read_digest(json.at("plan_sha256"));
+  c.state = json.at("state").string(40);
+  return c;
+}
+
+Json print_commanded(const CommandedShot& c) {
+  Json json{{"stop", c.stop}, {"camera", c.device}, {"id", c.id}, {"cam_from_world", print_pose(c.cam_from_world)}};
+  if (!c.lengths_m.empty()) json["lengths_m"] = c.lengths_m;
+  json["settle_s"] = c.settle_s;
+  json["exposure_s"] = c.exposure_s;
+  json["attempts"] = c.attempts;
+  json["plan_sha256"] = c.plan_sha256;
+  json["state"] = c.state;
+  return json;
+}
+
 Shot read_shot(const JsonReader& json) {
   Shot shot;
   shot.name = read_name(json.at("name"));
@@ -40,6 +70,7 @@ Shot read_shot(const JsonReader& json) {
   if (json.has("camera")) shot.camera = int(json.at("camera").integer(0, kMaxCameras));
   if (json.has("orientation")) shot.orientation = int(json.at("orientation").integer(1, 8));
   if (json.has("time")) shot.time = json.at("time").string(40);
+  if (json.has("commanded")) shot.commanded = read_commanded(json.at("commanded"));
   if (json.has("mask")) {
     const JsonReader mask = json.at("mask");
     const std::string source = mask.at("source").string();
@@ -61,6 +92,7 @@ Json print_shot(const Shot& shot, bool in_enclosure) {
   json["camera"] = shot.camera;
   if (shot.orientation != 1) json["orientation"] = shot.orientation;
   if (!shot.time.empty()) json["time"] = shot.time;
+  if (shot.commanded) json["commanded"] = print_commanded(*shot.commanded);
   if (shot.mask_source != MaskSource::none)
     json["mask"] = {{"source", kMaskSources[int(shot.mask_source)]}, {"sha256", shot.mask_sha256}};
   return json;

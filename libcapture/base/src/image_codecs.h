@@ -63,7 +63,7 @@ bool is_jpeg(Bytes start);
 bool is_png(Bytes start);
 
 /// `channels`: 0 = as stored, or what is wanted, done by the decoder itself where that is cheaper.
-Image decode_jpeg(Bytes bytes, const std::string& name, int channels);
+Image decode_jpeg(Bytes bytes, const std::string& name, int channels, int reduction);
 Image decode_png(Bytes bytes, const std::string& name, int channels);
 /// Grey, 8 bits, not interlaced, no filters, one IDAT chunk and no chunk of other kinds: what encode_mask writes. Empty
 /// if the file is anything else.

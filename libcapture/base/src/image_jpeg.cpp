@@ -72,7 +72,7 @@ void check_scans(j_common_ptr info) {
   if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number > kMaxScans) ERREXIT(info, JERR_BAD_PROGRESSION);
 }
 
-bool start(Decoder* d, const unsigned char* bytes, unsigned long count, int channels) {
+bool start(Decoder* d, const unsigned char* bytes, unsigned long count, int channels, int reduction) {
   if (setjmp(d->failure.jump)) return false;
   jpeg_create_decompress(&d->info);
   d->progress.progress_monitor = check_scans;
@@ -83,6 +83,9 @@ bool start(Decoder* d, const unsigned char* bytes, unsigned long count, int chan
     d->info.out_color_space = channels == 3 ? JCS_RGB : channels == 4 ? JCS_EXT_RGBA : JCS_GRAYSCALE;
   else if (d->info.num_components == 3)
     d->info.out_color_space = channels == 4 ? JCS_EXT_RGBA : JCS_RGB;
+  d->info.scale_num = 1;
+  d->info.scale_denom = unsigned(reduction);
+  jpeg_calc_output_dimensions(&d->info);
   return true;
 }
 
@@ -116,7 +119,7 @@ bool is_jpeg(Bytes start) {
   return start.size() >= 3 && start[0] == std::byte(0xff) && start[1] == std::byte(0xd8) && start[2] == std::byte(0xff);
 }
 
-Image decode_jpeg(Bytes bytes, const std::string& name, int channels) {
+Image decode_jpeg(Bytes bytes, const std::string& name, int channels, int reduction) {
   Decoder d;
   std::memset(&d, 0, sizeof d);
   install(d.failure, reinterpret_cast<j_common_ptr>(&d.info));
@@ -124,7 +127,9 @@ Image decode_jpeg(Bytes bytes, const std::string& name, int channels) {
     Decoder& d;
     ~Release() { jpeg_destroy_decompress(&d.info); }
   } release{d};
-  if (!start(&d, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), channels)) fail(d.failure, name);
+  if (!start(&d, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), channels,
+             reduction))
+    fail(d.failure, name);
   check_size(d.info.image_width, d.info.image_height, name);
   if (d.info.out_color_space == JCS_CMYK || d.info.jpeg_color_space == JCS_CMYK ||
       d.info.jpeg_color_space == JCS_YCCK || (d.info.num_components != 1 && d.info.num_components != 3))
@@ -137,7 +142,7 @@ Image decode_jpeg(Bytes bytes, const std::string& name, int channels) {
                     std::to_string(d.info.image_width) + " x " + std::to_string(d.info.image_height) + " pixels",
                 name);
   const int stored = d.info.out_color_space == JCS_GRAYSCALE ? 1 : d.info.out_color_space == JCS_RGB ? 3 : 4;
-  Image image = Image::uninitialized(int(d.info.image_width), int(d.info.image_height), stored);
+  Image image = Image::uninitialized(int(d.info.output_width), int(d.info.output_height), stored);
   if (!read_pixels(&d, reinterpret_cast<unsigned char*>(image.data()), image.row_bytes())) fail(d.failure, name);
   return channels == 0 || channels == stored ? std::move(image) : converted(image, PixelType::u8, channels);
 }

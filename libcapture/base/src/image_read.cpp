@@ -87,6 +87,26 @@ Format format_of(Bytes start, std::uint64_t size, const std::string& name) {
 void check_options(const ReadOptions& options) {
   if (options.channels != 0 && options.channels != 1 && options.channels != 3 && options.channels != 4)
     throw Error(ErrorCode::invalid_argument, "a picture is read with 1, 3 or 4 channels, or 0 for what it has");
+  if (options.reduction != 1 && options.reduction != 2 && options.reduction != 4 && options.reduction != 8)
+    throw Error(ErrorCode::invalid_argument, "a picture is read at 1/1, 1/2, 1/4 or 1/8 of its size");
+}
+
+/// Each n x n pixels averaged; at the right and at the bottom of those that are left.
+Image reduced(const Image& picture, int n) {
+  const Image image = converted(picture, PixelType::u8, picture.channels());
+  const int channels = image.channels();
+  Image out = Image::uninitialized((image.width() + n - 1) / n, (image.height() + n - 1) / n, channels);
+  for (int y = 0; y < out.height(); ++y)
+    for (int x = 0; x < out.width(); ++x)
+      for (int c = 0; c < channels; ++c) {
+        const int x1 = std::min((x + 1) * n, image.width()), y1 = std::min((y + 1) * n, image.height());
+        int sum = 0;
+        for (int j = y * n; j < y1; ++j)
+          for (int i = x * n; i < x1; ++i) sum += image.row<std::uint8_t>(j)[i * channels + c];
+        const int count = (x1 - x * n) * (y1 - y * n);
+        out.row<std::uint8_t>(y)[x * channels + c] = std::uint8_t((sum + count / 2) / count);
+      }
+  return out;
 }
 
 }  // namespace
@@ -99,8 +119,9 @@ Image decode_image(Bytes bytes, const std::string& name, const ReadOptions& opti
   const Format format = format_of(bytes, bytes.size(), name);
   if (format == Format::other)
     throw Error(ErrorCode::unsupported, "neither JPEG nor PNG: other formats are read from files only", name);
-  Image image =
-      format == Format::jpeg ? decode_jpeg(bytes, name, options.channels) : decode_png(bytes, name, options.channels);
+  Image image = format == Format::jpeg ? decode_jpeg(bytes, name, options.channels, options.reduction)
+                                       : decode_png(bytes, name, options.channels);
+  if (format != Format::jpeg && options.reduction != 1) image = reduced(image, options.reduction);
   if (options.apply_orientation)
     if (const int orientation = decode_image_info(bytes, name).orientation; orientation != 1)
       return oriented(image, orientation);
@@ -117,7 +138,8 @@ Image read_image(const std::filesystem::path& file, const ReadOptions& options) 
                       std::to_string(options.max_file_bytes),
                   file.string());
     if (format_of(source.read(0, 8), source.size(), file.string()) == Format::other)
-      return read_by_module(file, options);
+      return options.reduction == 1 ? read_by_module(file, options)
+                                    : reduced(read_by_module(file, options), options.reduction);
   }
   const std::string bytes = read_file(file, options.max_file_bytes);
   return decode_image(std::as_bytes(std::span(bytes)), file.string(), options);

@@ -38,6 +38,18 @@ struct PoseQuality {
   double rms_px = 0;  ///< sqrt(Σ (dx² + dy²) / points)
 };
 
+/// What a robot was told for a photograph, and how it went: of captures that libcapture took.
+struct CommandedShot {
+  std::string stop, device;      ///< the plan's stop and camera
+  std::uint32_t id = 0;          ///< the exposure's number in the journal
+  Pose cam_from_world;           ///< commanded, never measured
+  std::vector<double> lengths_m; ///< of the cables; empty without a mechanism
+  double settle_s = 0, exposure_s = 0;
+  int attempts = 1;              ///< how often the shutter was asked for this photograph
+  std::string plan_sha256;       ///< of the plan: it holds the mechanism as it was calibrated then
+  std::string state;             ///< "done", or "confirmed": in doubt, until the operator said that it was taken
+};
+
 /// One shot of one camera.
 struct Shot {
   std::string name;  ///< unique in the capture; masks and renderings are named after it
@@ -48,6 +60,7 @@ struct Shot {
   std::optional<Pose> cam_from_world;  ///< nullopt: not positioned
   std::optional<PoseQuality> pose_quality;  ///< of cam_from_world; whoever changes the pose resets it
   std::string time;                    ///< ISO 8601, from EXIF, or empty
+  std::optional<CommandedShot> commanded;   ///< nullopt: imported
   MaskSource mask_source = MaskSource::none;
   std::string mask_sha256;  ///< of the mask file as Lumihull wrote or imported it
 };
@@ -74,6 +87,8 @@ class LUMIHULL_API Capture {
  public:
   /// A new capture in a folder that does not exist yet or is empty. Errors: invalid_argument (folder in use), io.
   static Capture create(const std::filesystem::path& folder);
+  /// The same in a folder that may hold other files, but no capture.json.
+  static Capture create_among(const std::filesystem::path& folder);
   /// Errors: not_found (no capture.json or cameras.json), bad_input.
   static Capture open(const std::filesystem::path& folder);
 

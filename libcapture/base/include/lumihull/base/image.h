@@ -86,6 +86,9 @@ struct ReadOptions {
   bool apply_orientation = false;
   /// 0: as stored. 1, 3 or 4: convert (alpha dropped or set opaque, grey by Rec. 709 weights).
   int channels = 0;
+  /// 1, 2, 4 or 8: a picture of 1/n of each side, rounded up, for looking at (8 bits). JPEGs are decoded so, in part of the
+  /// time; of other formats each n x n pixels are averaged.
+  int reduction = 1;
   /// Largest file that is read, in bytes.
   std::size_t max_file_bytes = std::size_t(2) << 30;
 };
