@@ -1,6 +1,6 @@
 /**
- * Lumihull's C interface: the robot that carries the camera, and its plans. A part of lumihull.h, whose rules hold
- * here, too; include that.
+ * Lumihull's C interface: the robot that carries the camera, its plans, and the capture itself. A part of lumihull.h,
+ * whose rules hold here, too; include that.
  *
  * World: z up, metres; the platform's frame lies as the world's where its rotation is the identity. Angles are radians,
  * forces newtons. Views of an object lie on a hemisphere: theta is the azimuth, phi the angle from straight above.
@@ -344,6 +344,147 @@ typedef struct lh_plan_report {
 } lh_plan_report;
 LH_API lh_status lh_plan_judge(lh_context *ctx, const lh_plan *plan, const lh_camera *camera,
                                const lh_object_size *object, const double center[3], lh_plan_report *out);
+
+/* ---- capture session -----------------------------------------------------------------------------------------------
+ */
+
+/*
+ * Robots, cameras and the operator are asked on the thread of the call that uses them. What asks them must not use the
+ * call's context, but for lh_context_cancel and lh_context_cancelled. `user` is handed to each function. What fails
+ * returns a status; `reason` (256 bytes, "" at first) takes a line that says why.
+ */
+
+/** What carries the camera. One thread at a time. */
+typedef struct lh_robot lh_robot;
+/** What takes photographs. One thread at a time. */
+typedef struct lh_camera_device lh_camera_device;
+/** A controller on a serial line. */
+typedef struct lh_serial_link lh_serial_link;
+
+#define LH_MAX_CABLES 12
+
+typedef struct lh_robot_state {
+  size_t struct_size;
+  int32_t ready; /**< connected, no fault, may be commanded */
+  int32_t moving;
+  int32_t position_known; /**< no: the operator is asked before anything moves */
+  size_t cables;          /**< lengths that are known; 0: none */
+  double lengths_m[LH_MAX_CABLES];
+  char fault[256]; /**< in words; "": none */
+} lh_robot_state;
+
+typedef struct lh_robot_functions {
+  size_t struct_size;
+  void *user;
+  /** state: zero at first. */
+  lh_status (*state)(void *user, lh_robot_state *state, char *reason);
+  /** Goes to a stop and waits until it is there; the way was checked. lengths_m: stop->cables of them. */
+  lh_status (*move_to)(void *user, const char *name, const lh_stop *stop, const double *lengths_m, char *reason);
+  /** NULL: nothing turns. */
+  lh_status (*set_roll)(void *user, double roll_rad, char *reason);
+  /** The operator says that the platform is at that stop. NULL: nobody needs to know. */
+  lh_status (*declare_position)(void *user, const char *name, const lh_stop *stop, const double *lengths_m,
+                                char *reason);
+  /** Stops motors, leaves outputs safe. NULL: nothing to do. */
+  void (*make_safe)(void *user);
+} lh_robot_functions;
+
+#define LH_SHOT_DONE 0    /**< exactly one exposure was made */
+#define LH_SHOT_REFUSED 1 /**< none was made, surely */
+#define LH_SHOT_UNKNOWN 2 /**< one or none: the operator decides */
+
+typedef struct lh_shot {
+  size_t struct_size;
+  int32_t state;    /**< LH_SHOT_…; LH_SHOT_UNKNOWN at first */
+  char file[1024];  /**< where the camera's file is, where it delivers files; else "" */
+  char detail[256]; /**< why, for refused and unknown */
+} lh_shot;
+
+typedef struct lh_camera_functions {
+  size_t struct_size;
+  void *user;
+  int32_t delivers_files; /**< yes: shoot brings the file; no: it stays on the camera's card */
+  /** Releases the shutter once, returns after the exposure in bounded time. A retry after a refusal has the same id,
+   * any other exposure a new one. A file goes into `folder` under a name that is not in use there. A status other than
+   *  LH_OK: the device is lost. */
+  lh_status (*shoot)(void *user, uint32_t id, double exposure_s, const char *folder, lh_shot *shot, char *reason);
+  /** What became of an earlier shot. NULL: it can't tell. */
+  lh_status (*recall)(void *user, uint32_t id, lh_shot *shot, char *reason);
+  void (*make_safe)(void *user); /**< NULL: nothing to do */
+} lh_camera_functions;
+
+/** A robot of the application's own. functions is copied; `user` must outlive the robot. */
+LH_API lh_status lh_robot_create(lh_context *ctx, const lh_robot_functions *functions, lh_robot **out);
+LH_API lh_status lh_camera_device_create(lh_context *ctx, const lh_camera_functions *functions, lh_camera_device **out);
+/** By a word: robots "turntable" or "hand", cameras "hand": the session's operator is asked to do it. */
+LH_API lh_status lh_robot_by_word(lh_context *ctx, const char *word, lh_robot **out);
+LH_API lh_status lh_camera_device_by_word(lh_context *ctx, const char *word, lh_camera_device **out);
+/** Opens a port for this process alone, e.g. "/dev/ttyUSB0". baud: 0: 57600. @return LH_ENOTFOUND, LH_EIO */
+LH_API lh_status lh_serial_link_open(lh_context *ctx, const char *device, uint32_t baud, lh_serial_link **out);
+/** The robots and cameras on it keep it open. */
+LH_API void lh_serial_link_destroy(lh_serial_link *link);
+/** The winches. mechanism: that of the plan. */
+LH_API lh_status lh_robot_serial(lh_context *ctx, const lh_serial_link *link, const lh_mechanism *mechanism,
+                                 lh_robot **out);
+/** The shutter's contact; files stay in the camera. */
+LH_API lh_status lh_camera_device_serial(lh_context *ctx, const lh_serial_link *link, lh_camera_device **out);
+LH_API void lh_robot_destroy(lh_robot *robot);
+LH_API void lh_camera_device_destroy(lh_camera_device *camera);
+
+#define LH_QUESTION_MOTION 0   /**< the robot would start to move */
+#define LH_QUESTION_POSITION 1 /**< where the platform is */
+#define LH_QUESTION_DOUBT 2    /**< what became of a shot */
+#define LH_QUESTION_TASK 3     /**< something to do by hand */
+
+/** Who is asked what only a person can tell. */
+typedef struct lh_operator {
+  size_t struct_size;
+  void *user;
+  /** *answer: which of n choices; "stop" among them ends the session. */
+  lh_status (*ask)(void *user, int32_t question, const char *text, const char *const *choices, size_t n,
+                   size_t *answer);
+  void (*tell)(void *user, const char *line); /**< NULL: nobody listens */
+} lh_operator;
+
+typedef struct lh_session_options {
+  size_t struct_size;
+  const char *names;       /**< of photographs, with {stop}, {camera}, {number}; NULL: "{stop}-{camera}" */
+  double settle_s;         /**< instead of the plan's; 0: the plan's; negative: none */
+  double exposure_s;       /**< instead of the plan's; 0: the plan's */
+  int32_t retries;         /**< of a refused shot; 0: 2; negative: none */
+  int32_t agree_to_motion; /**< yes: without an operator the robot may start where it knows its position */
+  const char *retake;      /**< a stop to photograph once more, and nothing else; NULL: none */
+  size_t pause_after;      /**< photographs; 0: go on to the end */
+  const char *devices;     /**< words for the journal; NULL: the plan's robot */
+} lh_session_options;
+
+typedef struct lh_session_result {
+  size_t struct_size;
+  size_t views, of; /**< photographs in the folder, of the plan's */
+  size_t taken;     /**< in this session */
+  size_t awaited;   /**< taken, their files still on the camera's card */
+  int32_t paused;
+} lh_session_result;
+
+/** Checks all that can be checked without moving or writing: {"problems": […], "notes": […], "left": n, "seconds": s}.
+ *  cameras: n, in the order of the plan's. */
+LH_API lh_status lh_session_dry_run(lh_context *ctx, const lh_plan *plan, lh_robot *robot,
+                                    lh_camera_device *const *cameras, size_t n, const char *folder,
+                                    const lh_session_options *options, char *buffer, size_t size, size_t *needed);
+/**
+ * Carries out a plan, or goes on with it: moves, waits until the camera hangs still, releases each camera, puts the
+ * photographs into `folder`, which becomes a capture. After a killed session the same call goes on: no view is lost,
+ * none is taken twice unless the operator says so. However it ends, robot and cameras are made safe.
+ *
+ * @param who    NULL: nobody is there; a question that needs an answer ends the session
+ * @param result NULL, or how far it came
+ * @return LH_EINPUT: a problem that the dry run finds; a folder that was begun with another plan; LH_EIO: disk, device,
+ *         another process at work here; LH_EINVAL: a question that nobody answers; LH_ECANCELLED: by lh_context_cancel,
+ *         or the operator's "stop"
+ */
+LH_API lh_status lh_session_run(lh_context *ctx, const lh_plan *plan, lh_robot *robot, lh_camera_device *const *cameras,
+                                size_t n, const char *folder, const lh_session_options *options, const lh_operator *who,
+                                lh_session_result *result);
 
 #ifdef __cplusplus
 }

@@ -12,10 +12,14 @@
 #include <lumihull/calib/target_set.h>
 #include <lumihull/capture/mechanism_calibration.h>
 #include <lumihull/capture/planner.h>
+#include <lumihull/capture/robot.h>
+#include <lumihull/capture/serial.h>
 #include <lumihull/hull/mesh.h>
 #include <lumihull/hull/ray_scene.h>
 
 #include <cstddef>
+#include <memory>
+#include <string>
 #include <vector>
 
 struct lh_image {
@@ -74,4 +78,17 @@ struct lh_mechanism_calibration {
 struct lh_plan {
   lumihull::capture::PlannedTour value;
   lumihull::capture::PoseLimits limits;  ///< that it was made with
+};
+
+struct lh_serial_link {
+  std::shared_ptr<lumihull::capture::SerialLink> value;
+};
+
+struct lh_robot {
+  std::unique_ptr<lumihull::capture::Robot> device;  ///< none: a person, by `word`
+  std::string word;
+};
+
+struct lh_camera_device {
+  std::unique_ptr<lumihull::capture::CameraDevice> device;  ///< none: a person
 };

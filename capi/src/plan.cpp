@@ -123,6 +123,18 @@ std::optional<capture::KeepOut> lumihull::capi::keep_out_from(const lh_keep_out*
   return capture::KeepOut{point_from(o.base, name), o.radius_m, o.height_m};
 }
 
+lh_stop lumihull::capi::stop_to(const PlannedStop& s) {
+  lh_stop out{};
+  out.struct_size = sizeof out;
+  out.theta_rad = s.theta_rad, out.phi_rad = s.phi_rad, out.roll_rad = s.roll_rad;
+  pose_to(s.world_from_platform, out.world_from_platform);
+  pose_to(s.cam_from_world, out.cam_from_world);
+  out.travel_s = s.travel_s, out.settle_s = s.settle_s, out.exposure_s = s.exposure_s;
+  out.cables = s.lengths_m.size();
+  out.photograph = s.photograph;
+  return out;
+}
+
 lh_status lh_optics_camera(lh_context* ctx, const lh_optics* optics, double focus_m, lh_camera* camera) {
   return guarded(
       ctx, [&] { write_struct(camera, camera_to(capture::ideal_camera(optics_from(optics), focus_m)), "camera"); });
@@ -187,17 +199,7 @@ lh_status lh_plan_mechanism(lh_context* ctx, const lh_plan* plan, lh_mechanism**
 }
 
 lh_status lh_plan_stop(lh_context* ctx, const lh_plan* plan, size_t stop, lh_stop* out) {
-  return guarded(ctx, [&] {
-    const PlannedStop& s = stop_of(plan, stop);
-    lh_stop value{};
-    value.theta_rad = s.theta_rad, value.phi_rad = s.phi_rad, value.roll_rad = s.roll_rad;
-    pose_to(s.world_from_platform, value.world_from_platform);
-    pose_to(s.cam_from_world, value.cam_from_world);
-    value.travel_s = s.travel_s, value.settle_s = s.settle_s, value.exposure_s = s.exposure_s;
-    value.cables = s.lengths_m.size();
-    value.photograph = s.photograph;
-    write_struct(out, value, "out");
-  });
+  return guarded(ctx, [&] { write_struct(out, stop_to(stop_of(plan, stop)), "out"); });
 }
 
 lh_status lh_plan_stop_name(lh_context* ctx, const lh_plan* plan, size_t stop, char* buffer, size_t size,
