@@ -283,12 +283,32 @@ class Session {
     if (!plan_.mechanism) {
       go({plan_.stops[stop]}, stop);
     } else if (!as_planned) {
-      const Pose& from = at_ ? plan_.stops[*at_].world_from_platform : between_.value();
-      go(internal::way_out(plan_, from, plan_.stops[stop]), stop);
+      go(unplanned_way(stop), stop);
     } else {
       const std::size_t from = *at_;
       for (std::size_t i = std::min(from + 1, stop); i <= stop; ++i) go({plan_.stops[i]}, i);
     }
+  }
+
+  /// Straight up, over the object and down; where tensions do not allow that, along the plan's own ways, which were
+  /// checked and may be gone back.
+  std::vector<PlannedStop> unplanned_way(std::size_t stop) {
+    const Pose& from = at_ ? plan_.stops[*at_].world_from_platform : between_.value();
+    const std::size_t second = state().at_stop.value_or(stop), first = state().arrived_at.value_or(second);
+    const std::size_t low = std::min(first, second), high = std::max(first, second);
+    try {
+      return internal::way_out(plan_, from, plan_.stops[stop]);
+    } catch (const Error& e) {
+      if (e.code() != ErrorCode::degenerate || (!at_ && high - low > 1)) throw;
+      who_.tell(std::string(e.what()) + "; it goes along the plan's own ways instead");
+    }
+    // From between two neighbours: to that of the two which lies towards where it should go.
+    const std::size_t begin = at_ ? *at_ : stop >= high ? high : low;
+    std::vector<PlannedStop> way;
+    if (!at_ && begin != stop) way.push_back(plan_.stops[begin]);
+    for (std::size_t i = begin; i != stop;) way.push_back(plan_.stops[i < stop ? ++i : --i]);
+    if (way.empty()) way.push_back(plan_.stops[stop]);
+    return way;
   }
 
   void go(const std::vector<PlannedStop>& way, std::size_t stop) {
