@@ -461,7 +461,7 @@ typedef struct lh_session_options {
 typedef struct lh_session_result {
   size_t struct_size;
   size_t views, of; /**< photographs in the folder, of the plan's */
-  size_t taken;     /**< in this session */
+  size_t taken;     /**< by this call */
   size_t awaited;   /**< taken, their files still on the camera's card */
   int32_t paused;
 } lh_session_result;

@@ -122,7 +122,10 @@ void free_more_if_needed(Network& n, int part, CalibrateOptions& options, Job& j
   const Network before = n;
   const double scale = std::max(1.0, residual_scale(n, part)), c = kRobust * scale;
   const double cost = robust_cost(n, part, c);
-  if (settle_robustly(n, part, 6, job, wider.free) && cost - robust_cost(n, part, c) > kAsksForMore * scale * scale)
+  const bool settled = settle_robustly(n, part, 6, job, wider.free).has_value();
+  // What left the part would lower the loss as well.
+  const bool all = n.photo_part == before.photo_part && n.body_part == before.body_part;
+  if (settled && all && cost - robust_cost(n, part, c) > kAsksForMore * scale * scale)
     options.free = wider.free;
   else
     n = before;

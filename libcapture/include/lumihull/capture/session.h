@@ -49,7 +49,7 @@ LUMIHULL_API DryRun dry_run(const Plan& plan, Robot& robot, std::span<CameraDevi
 
 struct SessionResult {
   std::size_t views = 0, of = 0;  ///< photographs in the folder, of the plan's
-  std::size_t taken = 0;          ///< in this session
+  std::size_t taken = 0;          ///< by this call
   std::size_t awaited = 0;        ///< taken, their files still on the camera's card
   bool paused = false;
 };
