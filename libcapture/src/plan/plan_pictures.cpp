@@ -37,7 +37,7 @@ std::string note_of(const Plan& plan) {
   }
   char text[200];
   std::snprintf(text, sizeof text,
-                "%zu stops, %zu of them only passed or for turning the camera; %.1f m; dark: first, light: last",
+                "%zu views, and %zu places that are passed or where the camera is turned; %.1f m; dark: first, light: last",
                 photographs, plan.stops.size() - photographs, travel_m);
   return text;
 }
