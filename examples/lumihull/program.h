@@ -97,5 +97,6 @@ void add_targets(Program& program);
 void add_detect(Program& program);
 void add_ingest(Program& program);
 void add_plan(Program& program);
+void add_experiments(Program& program);  // repeatability, stability
 
 }  // namespace lumihull::program
