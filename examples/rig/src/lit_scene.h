@@ -28,6 +28,8 @@ class LitScene {
   LitScene(const Scene& scene, const LightOptions& options, Job& job);
 
   const Room& room() const { return room_; }
+  /// Of the ball around all objects.
+  const Eigen::Vector3f& center() const { return center_; }
   /// First object along each ray; all misses in an empty room.
   void hit(std::span<const hull::Ray> rays, std::span<hull::Hit> hits) const;
   /// Index of the object that a triangle belongs to.
