@@ -27,29 +27,38 @@ struct Crop {
   Image reflected, part;  ///< what the sheet reflects, weighed with the part of the pixel that it takes; that part
 };
 
-/// Where a sheet's border is in the picture, enlarged by `margin` px; nothing where it is not.
-Crop crop_of(const FlatPrint& print, std::span<const View> views, int margin) {
-  constexpr int kSteps = 8;
-  Eigen::AlignedBox2d box;
+/// Where a sheet is in the picture, enlarged by `margin` px; empty where it is not. Sheets that reach behind the
+/// camera, or beyond the lens, are looked at more closely.
+Crop crop_of(const FlatPrint& print, std::span<const View> views, double margin) {
   const Camera& camera = views[0].camera;
-  int behind = 0, before = 0;
-  for (const View& view : views)
-    for (int i = 0; i <= kSteps; ++i)
-      for (int j = 0; j <= kSteps; ++j) {
-        const Eigen::Vector2d at = print.low + Eigen::Vector2d(i, j).cwiseProduct(print.high - print.low) / kSteps;
-        const Eigen::Vector3d world =
-            print.world_from_print * Eigen::Vector3d(at.x() * print.stretch.x(), at.y() * print.stretch.y(), 0);
-        const auto px = view.project(world);
-        px ? ++before : ++behind;
-        if (px) box.extend(*px);
-      }
-  if (before == 0) return {};
-  if (behind > 0) return {0, 0, camera.width, camera.height, {}, {}};
-  const int x0 = int(std::clamp(std::floor(box.min().x()) - margin, 0., double(camera.width)));
-  const int y0 = int(std::clamp(std::floor(box.min().y()) - margin, 0., double(camera.height)));
-  const int x1 = int(std::clamp(std::ceil(box.max().x()) + margin, 0., double(camera.width)));
-  const int y1 = int(std::clamp(std::ceil(box.max().y()) + margin, 0., double(camera.height)));
-  return {x0, y0, x1 - x0, y1 - y0, {}, {}};
+  const Eigen::AlignedBox2d picture(Eigen::Vector2d(0, 0), Eigen::Vector2d(camera.width, camera.height));
+  Eigen::AlignedBox2d box;
+  for (const int steps : {8, 64}) {
+    bool all = true;
+    box.setEmpty();
+    for (const View& view : views)
+      for (int i = 0; i <= steps; ++i)
+        for (int j = 0; j <= steps; ++j) {
+          const Eigen::Vector2d at = (print.low + Eigen::Vector2d(i, j).cwiseProduct(print.high - print.low) / steps)
+                                         .cwiseProduct(print.stretch);
+          const auto px = view.project(print.world_from_print * Eigen::Vector3d(at.x(), at.y(), 0));
+          all = all && px;
+          // A coarse look counts what is beside the picture, too: a sheet may lie across it.
+          if (px && (steps == 8 || picture.contains(*px))) box.extend(*px);
+        }
+    if (box.isEmpty()) return {};
+    margin += steps == 64 ? .05 * box.diagonal().norm() : 0;
+    if (all) break;
+  }
+  const auto within = [](double px, int size) { return int(std::clamp(px, 0., double(size))); };
+  const int x0 = within(std::floor(box.min().x() - margin), camera.width);
+  const int y0 = within(std::floor(box.min().y() - margin), camera.height);
+  return {x0,
+          y0,
+          within(std::ceil(box.max().x() + margin), camera.width) - x0,
+          within(std::ceil(box.max().y() + margin), camera.height) - y0,
+          {},
+          {}};
 }
 
 bool meet(const Crop& a, const Crop& b) {
@@ -83,8 +92,7 @@ void add_sheets(const LitScene& scene, const View& view, const Shutter& shutter,
     for (int i = 0; i < n; ++i) views.push_back({view.camera, shutter.at((i + .5) / n).cam_from_world()});
   }
   std::vector<Crop> crops(sheets.size());
-  for (std::size_t i = 0; i < sheets.size(); ++i)
-    crops[i] = crop_of(sheets[i], views, 2 + int(std::ceil(kGaussianReach * sigma[i])));
+  for (std::size_t i = 0; i < sheets.size(); ++i) crops[i] = crop_of(sheets[i], views, 2 + kGaussianReach * sigma[i]);
   parallel_for(job, sheets.size(), [&](std::size_t i) {
     Crop& crop = crops[i];
     if (crop.width <= 0 || crop.height <= 0) return;
