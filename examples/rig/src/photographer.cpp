@@ -180,7 +180,9 @@ Photographer::Photographer(const Scene& scene, const LightOptions& options, Job&
 Photographer::Photographer(Photographer&&) noexcept = default;
 Photographer::~Photographer() = default;
 
-Photo Photographer::photograph(const View& view, const PhotoOptions& options, std::uint64_t seed, Job& job) const {
+Photo Photographer::photograph(const View& view, const PhotoOptions& options, std::uint64_t seed, Job& job,
+                               std::span<const Pose> during) const {
+  (void)during;
   check(options);
   view.camera.validate();
   if (!impl_->scene.room().contains(view.center().cast<float>()))
