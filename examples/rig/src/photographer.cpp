@@ -12,6 +12,7 @@
 #include "lit_scene.h"
 #include "noise.h"
 #include "sheets.h"
+#include "thin_lines.h"
 
 namespace lumihull::rig {
 
@@ -208,6 +209,7 @@ Photo Photographer::photograph(const View& view, const PhotoOptions& options, st
     gaussian_blur(exposure.cover, options.blur_px);
   }
   add_sheets(impl_->scene, view, options.blur_px, exposure.cover, exposure.light, job);
+  add_lines(impl_->scene, view, options.lines, options.blur_px, exposure.light);
   Photo photo;
   photo.picture = develop(exposure.light, options, mix(seed), job);
   photo.mask = converted(exposure.cover, PixelType::u8, 1);

@@ -136,7 +136,7 @@ ShotOutcome RigCamera::shoot(ShotId id, double exposure_s, const fs::path& folde
   for (int i = 0; i < kMoments; ++i)
     moments.push_back(robot_.cam_from_world(e.time_s + exposure_s * i / (kMoments - 1)) * plan_from_world);
   e.cam_from_world = mean_of(moments);
-  const double distance = (options_.world_from_plan * Eigen::Vector3d(0, 0, 0) - e.cam_from_world.center()).norm();
+  const double distance = (options_.world_from_plan * options_.center - e.cam_from_world.center()).norm();
   const double sway = sway_of(options_.lens.camera, moments, std::max(.1, distance));
   if (sway > kSharp_px) e.during = moments;
   if (options_.cables)

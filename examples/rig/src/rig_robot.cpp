@@ -113,7 +113,7 @@ void RigRobot::arrive(const PlannedStop& stop, double swing) {
   memory_.stop = stop.name;
   memory_.lengths_m = stop.lengths_m;
   memory_.commanded = mechanism_ ? stop.world_from_platform : stop.cam_from_world;
-  memory_.arrived_s = memory_.clock_s;
+  memory_.arrived_s = memory_.still_s = memory_.clock_s;
   memory_.swing = swing;
   rest_ = rest_of(stop, memory_.visit);
   remember();
@@ -130,7 +130,7 @@ void RigRobot::move_to(const PlannedStop& stop, Job& job) {
 void RigRobot::set_roll(double roll_rad, Job& job) {
   job.check();
   tick();
-  memory_.clock_s += 2;
+  memory_.still_s = memory_.clock_s += 2;
   memory_.roll_rad = roll_rad;
   memory_.turned_at = memory_.stop;
   remember();
@@ -154,6 +154,8 @@ void RigRobot::pass(double seconds) {
   memory_.clock_s += seconds;
   remember();
 }
+
+void RigRobot::settle(double seconds) { pass(std::max(0., memory_.still_s + seconds - now_s())); }
 
 /// Swing of a pendulum with several modes, each with its own period and phase; the tilt goes with the shift.
 Pose RigRobot::platform_at(double time_s) const {
@@ -216,7 +218,7 @@ void RigRobot::remember() const {
   const Eigen::Quaterniond& q = m.commanded.rotation;
   const Vector3d& t = m.commanded.translation;
   text << "rig-robot 1\n"
-       << "stop " << m.stop << "\nvisit " << m.visit << "\nclock " << m.clock_s << ' ' << m.arrived_s << ' ' << m.swing
+       << "stop " << m.stop << "\nvisit " << m.visit << "\nclock " << m.clock_s << ' ' << m.arrived_s << ' ' << m.still_s << ' ' << m.swing
        << "\nroll " << m.roll_rad << ' ' << m.turned_at << "\npose " << q.w() << ' ' << q.x() << ' ' << q.y() << ' '
        << q.z() << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << "\nlengths";
   for (const double length : m.lengths_m) text << ' ' << length;
@@ -250,7 +252,7 @@ void RigRobot::recall() {
     } else if (word == "visit") {
       words >> m.visit;
     } else if (word == "clock") {
-      words >> m.clock_s >> m.arrived_s >> m.swing;
+      words >> m.clock_s >> m.arrived_s >> m.still_s >> m.swing;
     } else if (word == "roll") {
       words >> m.roll_rad;
       m.turned_at = rest();

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 
 namespace lumihull::rig {
 
@@ -27,12 +28,6 @@ const std::map<std::string, Usual, std::less<>> kUsual = {
 Usual usual(const std::string& object) {
   const auto known = kUsual.find(object);
   return known == kUsual.end() ? Usual{.6, 1.5} : known->second;
-}
-
-std::string text(const char* format, double x, double y = 0) {
-  char out[200];
-  std::snprintf(out, sizeof out, format, x, y);
-  return out;
 }
 
 /// The widest spacing that gives at least n views.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <lumihull/capture/optics.h>
 #include <lumihull/rig/simulate.h>
 
 namespace lumihull::rig {

@@ -43,6 +43,7 @@ class RigCamera : public capture::CameraDevice {
     bool depth = false;          ///< as NUMBER.depth: width x height floats, little-endian, row by row, m
     bool cables = true;          ///< they may cross the picture
     Pose world_from_plan;        ///< the scene's world
+    Eigen::Vector3d center{0, 0, 0};  ///< of the views, in the plan's world
     std::uint64_t seed = 1;      ///< of the sensor's noise
   };
   /// photographer: asked for when the first photograph is taken; it and the robot outlive the camera.

@@ -63,8 +63,10 @@ class RigRobot : public capture::Robot {
   void declare_position(const capture::PlannedStop& stop) override;
   void make_safe() noexcept override {}
 
-  /// Lets time pass: settling, an exposure.
+  /// Lets time pass: an exposure.
   void pass(double seconds);
+  /// Lets time pass until so many seconds after the last move or turn; none where they have passed.
+  void settle(double seconds);
   double now_s() const;  ///< since the first session began
   const std::string& stop() const { return memory_.stop; }
 
@@ -93,7 +95,7 @@ class RigRobot : public capture::Robot {
   struct Memory {
     std::string stop;  ///< empty: not yet anywhere
     std::vector<double> lengths_m;
-    double clock_s = 0, arrived_s = 0, swing = 0;
+    double clock_s = 0, arrived_s = 0, still_s = 0, swing = 0;
     double roll_rad = 0;
     std::string turned_at;  ///< where the bearing was last turned
     int visit = 0;          ///< of `stop`, from 1
