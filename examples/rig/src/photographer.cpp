@@ -12,6 +12,7 @@
 #include "lit_scene.h"
 #include "noise.h"
 #include "sheets.h"
+#include "thin_lines.h"
 
 namespace lumihull::rig {
 
@@ -180,7 +181,9 @@ Photographer::Photographer(const Scene& scene, const LightOptions& options, Job&
 Photographer::Photographer(Photographer&&) noexcept = default;
 Photographer::~Photographer() = default;
 
-Photo Photographer::photograph(const View& view, const PhotoOptions& options, std::uint64_t seed, Job& job) const {
+Photo Photographer::photograph(const View& view, const PhotoOptions& options, std::uint64_t seed, Job& job,
+                               std::span<const Pose> during) const {
+  (void)during;
   check(options);
   view.camera.validate();
   if (!impl_->scene.room().contains(view.center().cast<float>()))
@@ -206,6 +209,7 @@ Photo Photographer::photograph(const View& view, const PhotoOptions& options, st
     gaussian_blur(exposure.cover, options.blur_px);
   }
   add_sheets(impl_->scene, view, options.blur_px, exposure.cover, exposure.light, job);
+  add_lines(impl_->scene, view, options.lines, options.blur_px, exposure.light);
   Photo photo;
   photo.picture = develop(exposure.light, options, mix(seed), job);
   photo.mask = converted(exposure.cover, PixelType::u8, 1);

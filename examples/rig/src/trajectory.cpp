@@ -39,21 +39,25 @@ void check(int n, const Hemisphere& h) {
 
 }  // namespace
 
-Camera default_camera(int width, bool distortion) {
+Camera sensor_camera(int width, double focal_mm, double sensor_width_mm, double distortion) {
+  if (width < 2 || !(focal_mm > 0) || !(sensor_width_mm > 0) || !std::isfinite(focal_mm) ||
+      !std::isfinite(sensor_width_mm) || !(distortion >= 0 && distortion <= 1))
+    throw Error(ErrorCode::invalid_argument,
+                "expected a width of at least 2 px, positive lengths, and distortion from 0 to 1", "sensor camera");
   Camera camera;
   camera.width = width;
   camera.height = width * 2 / 3;
-  camera.f = kFocalLength_mm / kSensorWidth_mm * width;
-  camera.u0 = .5 * camera.width;
-  camera.v0 = .5 * camera.height;
-  if (distortion) {
-    camera.s = 1.0004;
-    camera.u0 += .0041 * width;
-    camera.v0 -= .0027 * width;
-    camera.k1 = .034, camera.k2 = -.011, camera.k3 = .002;
-    camera.p1 = .0004, camera.p2 = -.0003;
-  }
+  camera.f = focal_mm / sensor_width_mm * width;
+  camera.s = 1 + .0004 * distortion;
+  camera.u0 = .5 * camera.width + .0041 * width * distortion;
+  camera.v0 = .5 * camera.height - .0027 * width * distortion;
+  camera.k1 = .034 * distortion, camera.k2 = -.011 * distortion, camera.k3 = .002 * distortion;
+  camera.p1 = .0004 * distortion, camera.p2 = -.0003 * distortion;
   return camera;
+}
+
+Camera default_camera(int width, bool distortion) {
+  return sensor_camera(width, kFocalLength_mm, kSensorWidth_mm, distortion ? 1 : 0);
 }
 
 double framing_distance(const Camera& camera, double ball_radius, double fill) {

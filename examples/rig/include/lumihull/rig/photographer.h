@@ -4,9 +4,12 @@
 #include <lumihull/base/image.h>
 #include <lumihull/base/job.h>
 #include <lumihull/rig/scene.h>
+#include <lumihull/rig/trajectory.h>
 
 #include <cstdint>
 #include <memory>
+#include <span>
+#include <vector>
 
 namespace lumihull::rig {
 
@@ -19,15 +22,28 @@ struct LightOptions {
       .01f;  ///< triangles are split until their edges are shorter than this part of the object's size
 };
 
+/// A cable or the like: a cylinder that is dark, thin, and throws no shadow.
+struct ThinLine {
+  Eigen::Vector3d from, to;  ///< world, m
+  float radius = .001f;      ///< m
+  Eigen::Vector3f color{.012f, .012f, .013f};  ///< radiance
+};
+
 /// What happens between the lens and the file.
 struct PhotoOptions {
-  int rays = 2;              ///< rays x rays a pixel …
-  int edge_rays = 6;         ///< … and so many where the first ones disagree: outlines
-  double blur_px = 0;        ///< of the lens: sigma of a Gaussian, in linear light, 0 … 100
-  double exposure = 1;       ///< radiance 1 / exposure is white
-  double full_well = 25000;  ///< electrons at white: shot noise. 0: none
-  double read_noise = 9;     ///< electrons
-  bool depth = false;        ///< fill Photo::depth
+  int rays = 2;        ///< rays x rays a pixel …
+  int edge_rays = 6;   ///< … and so many where the first ones disagree: outlines
+  double blur_px = 0;  ///< of the lens: sigma of a Gaussian, in linear light, 0 … 100
+  /// Thin lens: its opening is focal length / f_number wide. 0: a pinhole, all is sharp; else 0.5 … 1000.
+  double f_number = 0;
+  double focus_m = 0;  ///< where the sharp plane is along the optical axis, m; 0: the scene's centre
+  double sensor_width_mm = kSensorWidth_mm;  ///< says how many mm Camera::f is
+  double exposure = 1;                       ///< radiance 1 / exposure is white
+  double full_well = 25000;                  ///< electrons at white: shot noise. 0: none
+  double read_noise = 9;                     ///< electrons
+  bool bayer = false;                        ///< the sensor sees one colour a pixel (RGGB), demosaiced bilinearly
+  bool depth = false;                        ///< fill Photo::depth
+  std::vector<ThinLine> lines;                ///< objects hide them; masks don't know of them
   int reduce = 1;  ///< > 1: light is traced at 1/reduce of the size and enlarged bicubically; noise at full size
 };
 
@@ -48,9 +64,12 @@ class Photographer {
   Photographer(Photographer&&) noexcept;
   ~Photographer();
 
-  /// The photograph is a function of scene, view, options and seed (which makes the noise), whatever the threads.
-  /// Errors: invalid_argument (camera outside the enclosure, options out of range).
-  Photo photograph(const View& view, const PhotoOptions& options, std::uint64_t seed, Job& job) const;
+  /// `during`: cam_from_world at equally spaced moments from the shutter's opening to its closing, between which the
+  /// camera moves evenly; empty: it stands at the view's pose. Focus and depth are the view's.
+  /// The photograph is a function of scene, view, options, seed (of noise, and of where rays pass the lens, and when)
+  /// and `during`, whatever the threads. Errors: invalid_argument (camera outside the enclosure, options out of range).
+  Photo photograph(const View& view, const PhotoOptions& options, std::uint64_t seed, Job& job,
+                   std::span<const Pose> during = {}) const;
 
  private:
   struct Impl;

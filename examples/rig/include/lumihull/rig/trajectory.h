@@ -9,10 +9,16 @@
 
 namespace lumihull::rig {
 
-/// Camera like the paper's (section 2.3): 6.3 megapixels, 18 mm lens on a sensor of 22.7 mm, `width` pixels wide and
-/// two thirds as high; with distortion about 1.5 % of barrel and a principal point off the centre.
-Camera default_camera(int width = 3072, bool distortion = true);
+/// The paper's camera (sections 2.3, 5.4): 3072 x 2048 pixels on 22.7 x 15.1 mm, lenses of 10 and 18 mm.
 inline constexpr double kFocalLength_mm = 18, kSensorWidth_mm = 22.7;
+
+/// A camera `width` pixels wide (at least 2) and two thirds as high, with square pixels on a sensor of
+/// `sensor_width_mm`. distortion: 1 is a lens with barrel (1.5 % at 18 mm, in normalised coordinates: more at 10 mm), a
+/// principal point off the centre and .04 % of skewed aspect; 0 is ideal, in between is in between.
+/// Error{invalid_argument} where a length is not positive.
+Camera sensor_camera(int width, double focal_mm, double sensor_width_mm = kSensorWidth_mm, double distortion = 1);
+/// The paper's with its 18 mm lens.
+Camera default_camera(int width = 3072, bool distortion = true);
 
 /// The distance at which a ball fills `fill` of the picture's smaller side.
 double framing_distance(const Camera& camera, double ball_radius, double fill = 0.85);
