@@ -97,11 +97,12 @@ std::optional<MaskTruth> compare_masks(const Capture& capture, const std::filesy
   double bias = 0;
   std::size_t biased = 0;
   for (const MaskTruth::Shot& s : out.shots) {
-    out.iou_mean += s.iou / double(out.shots.size());
+    out.iou_mean += s.iou;
     out.iou_least = std::min(out.iou_least, s.iou);
     out.holes += s.holes, out.islands += s.islands;
     if (std::isfinite(s.bias_px)) bias += s.bias_px, ++biased;
   }
+  out.iou_mean /= double(out.shots.size());
   out.bias_px = biased ? bias / double(biased) : kUnknown;
   return out;
 }

@@ -134,9 +134,10 @@ SurfaceTruth compare_surface(const Capture& capture, hull::Mesh hull, const hull
   if (shown.empty()) return out;
   out.iou_mean = 0, out.iou_least = 1;
   for (const SurfaceTruth::Shot& s : out.silhouettes) {
-    out.iou_mean += s.iou / double(shown.size());
+    out.iou_mean += s.iou;
     out.iou_least = std::min(out.iou_least, s.iou);
   }
+  out.iou_mean /= double(shown.size());
   return out;
 }
 
