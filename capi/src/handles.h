@@ -16,6 +16,7 @@
 #include <lumihull/capture/serial.h>
 #include <lumihull/hull/mesh.h>
 #include <lumihull/hull/ray_scene.h>
+#include <lumihull/slf/truth.h>
 
 #include <cstddef>
 #include <memory>
@@ -61,6 +62,10 @@ struct lh_lens {
 
 struct lh_target_model {
   lumihull::calib::TargetModel value;
+};
+
+struct lh_truth_comparison {
+  lumihull::slf::TruthComparison value;
 };
 
 struct lh_ink_samples {

@@ -11,6 +11,9 @@ namespace lumihull::slf {
 
 using lumihull::internal::html_escaped;
 
+/// What the pages look like: for <style>.
+std::string page_style();
+
 /// A picture with words below it, embedded as JPEG; what is transparent in it becomes grey (alpha takes PNG, many times
 /// as large).
 std::string figure(const Image& picture, const std::string& caption);

@@ -22,22 +22,6 @@ constexpr std::size_t kSheetPhotos = 48;  // pictures on the contact sheet: enou
 constexpr int kHullFrames = 4;
 constexpr int kThumbnail = 220, kModelPicture = 420;
 
-constexpr const char* kStyle = R"(
-:root{color-scheme:light dark;--line:#8884;--dim:#777}
-body{font:16px/1.5 system-ui,sans-serif;margin:0 auto;max-width:72rem;padding:1rem}
-h1{margin:.5rem 0}h2{margin:2rem 0 .5rem;border-bottom:1px solid var(--line)}h3{margin:1.2rem 0 .3rem;font-size:1rem}
-p{margin:.4rem 0}.dim{color:var(--dim);font-size:.875rem}
-.grid{display:grid;gap:.6rem;grid-template-columns:repeat(auto-fill,minmax(9rem,1fr))}
-.wide{grid-template-columns:repeat(auto-fill,minmax(14rem,1fr))}
-.compared{grid-template-columns:repeat(auto-fit,minmax(10rem,1fr));align-items:start}
-.strips{display:grid;gap:.6rem}
-figure{margin:0;border:1px solid var(--line);border-radius:.4rem;overflow:hidden}
-figure img{display:block;width:100%;height:auto}figcaption{padding:.15rem .4rem;font-size:.8rem;overflow-wrap:anywhere}
-.scroll{overflow-x:auto}table{border-collapse:collapse}
-td,th{padding:.2rem .7rem;border-bottom:1px solid var(--line);text-align:right;white-space:nowrap}
-td:first-child,th:first-child{text-align:left}summary{cursor:pointer;margin:.4rem 0}
-)";
-
 /// What lies outside the mask becomes pale, so that both the photograph and its silhouette are seen.
 Image outlined(const Photo& photo) {
   Image out = photo.rgb;
@@ -162,17 +146,19 @@ void write_report(const Capture& capture, const ReportOptions& options, Job& job
   std::string page =
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>" +
-      html_escaped(name) + "</title><style>" + kStyle + "</style></head><body>\n<h1>" + html_escaped(name) +
+      html_escaped(name) + "</title><style>" + page_style() + "</style></head><body>\n<h1>" + html_escaped(name) +
       "</h1>\n<p>" + std::to_string(capture.shots.size()) + " photographs, " +
       std::to_string(count_if([&](std::size_t i) { return capture.positioned(i); })) + " positioned, " +
       std::to_string(count_if([&](std::size_t i) { return capture.held_out(i); })) +
       " held out; unit: " + (capture.unit == Unit::metres ? "metres" : "unknown") + ".</p>\n";
   if (file_exists(capture.folder() / "calibration.html"))
     page += "<p><a href=\"calibration.html\">How good the cameras' poses are</a></p>\n";
+  if (file_exists(truth_page_path(capture)))
+    page += "<p><a href=\"evaluate/truth.html\">All of it beside the truth</a></p>\n";
   for (const std::string& note : capture.notes) page += "<p class=\"dim\">" + html_escaped(note) + "</p>\n";
   if (has_light_field)
     add_light_field(page, light_field, positioned_views(capture), around(options.turntable_frames), job);
-  if (options.evaluation) add_evaluation(page, capture, *options.evaluation, job);
+  if (options.evaluation && options.evaluation->photos_held_out) add_evaluation(page, capture, *options.evaluation, job);
   if (has_model) add_model(page, capture, options.turntable_frames, model, job);
   if (has_hull) add_hull(page, capture, job);
   if (!capture.shots.empty()) add_photographs(page, capture, job);

@@ -60,6 +60,8 @@ void add_each(std::string& page, const Evaluation& e) {
   page += "</table></div></details>\n";
 }
 
+}  // namespace
+
 void add_test_views(std::string& page, const TestViewEvaluation& t) {
   page += "<h3>Test views</h3>\n<p>Means over " + std::to_string(t.views) +
           " views that are no photographs of the capture" +
@@ -85,6 +87,8 @@ void add_test_views(std::string& page, const TestViewEvaluation& t) {
   }
   page += "</table></div>\n";
 }
+
+namespace {
 
 /// One of the three pictures side by side that the evaluation wrote, made smaller and upright.
 Image panel(const Image& three, int which, int orientation) {

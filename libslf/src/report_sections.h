@@ -22,6 +22,9 @@ inline constexpr int kFanPictures = 7;
 void add_light_field(std::string& page, const std::filesystem::path& file, std::span<const View> photographs,
                      const TurntableOptions& turn, Job& job);
 
+/// Figures of the test views.
+void add_test_views(std::string& page, const TestViewEvaluation& t);
+
 /// Figures and comparison pictures of the held-out photographs. Errors: bad_input, io (a picture in evaluate/).
 void add_evaluation(std::string& page, const Capture& capture, const Evaluation& evaluation, Job& job);
 

@@ -68,6 +68,7 @@ bool always_needed(const Capture& capture, std::string& why);
 
 std::filesystem::path textured_path(const Capture& capture);
 std::filesystem::path light_field_path(const Capture& capture);
+std::filesystem::path truth_page_path(const Capture& capture);  ///< evaluate/truth.html
 std::filesystem::path evaluation_path(const Capture& capture);
 
 /// A mask to judge a photograph by: NAME.png, .jpg, .jpeg, .tif or .tiff; nullopt where there is none.

@@ -254,6 +254,32 @@ static void open_wrong_files(lh_context *ctx) {
   CHECK(renderer == NULL);
 }
 
+/* The capture beside the rig's truth: matrices are exact, silhouettes nearly so. */
+static void compare_with_truth(lh_context *ctx, const lh_capture *capture) {
+  lh_truth_comparison *comparison = NULL;
+  char *json;
+  FILE *page;
+  size_t needed = 0;
+  EXPECT(ctx, LH_ENOTFOUND, lh_truth_compare(ctx, capture, in(rig, "photos"), &comparison));
+  EXPECT(ctx, LH_EINVAL, lh_truth_compare(ctx, capture, in(rig, "truth"), NULL));
+  CHECK(comparison == NULL);
+  MUST(ctx, lh_truth_compare(ctx, capture, in(rig, "truth"), &comparison));
+  MUST(ctx, lh_truth_comparison_describe(ctx, comparison, NULL, 0, &needed));
+  json = malloc(needed);
+  if (!json) exit(1);
+  MUST(ctx, lh_truth_comparison_describe(ctx, comparison, json, needed, &needed));
+  CHECK(strstr(json, "\"poses\"") && strstr(json, "\"masks\"") && strstr(json, "\"surface\""));
+  CHECK(number_in(json, "iou_mean") > 0.96);
+  CHECK(fabs(number_in(json, "focal_error_percent")) < 1e-6);
+  free(json);
+  MUST(ctx, lh_truth_comparison_page(ctx, comparison, capture, in(scratch, "truth.html")));
+  page = fopen(in(scratch, "truth.html"), "rb");
+  CHECK(page != NULL);
+  if (page) fclose(page);
+  lh_truth_comparison_destroy(comparison);
+  lh_truth_comparison_destroy(NULL);
+}
+
 int main(int argc, char **argv) {
   lh_context *ctx = lh_context_create();
   lh_capture *capture = NULL, *copy = NULL;
@@ -327,6 +353,7 @@ int main(int argc, char **argv) {
   json = text_of(ctx, capture, lh_capture_describe);
   CHECK(strstr(json, "hull") != NULL);
   free(json);
+  compare_with_truth(ctx, capture);
 
   /* Nothing has changed: every stage is skipped. */
   memset(&said, 0, sizeof said);

@@ -26,6 +26,17 @@ def test_the_main_job(finished: lumihull.Capture, rig: Path) -> None:
     assert judged["methods"]["lumigraph"]["psnr"] > 18
 
 
+def test_beside_the_truth(finished: lumihull.Capture, rig: Path, tmp_path: Path) -> None:
+    compared = finished.compare_with_truth(rig / "truth", page=tmp_path / "truth.html")
+    assert compared["poses"]["center_mm"]["max"] < 1e-3
+    assert compared["masks"]["iou_mean"] > 0.96 and len(compared["masks"]["shots"]) == 24
+    assert 1 < compared["surface"]["volume_ratio"] < 1.15
+    assert any(line.startswith("targets:") for line in compared["left_out"])
+    assert "<svg" in (tmp_path / "truth.html").read_text()
+    with pytest.raises(lumihull.Error):
+        finished.compare_with_truth(rig / "nowhere")
+
+
 def test_stages_are_skipped_when_nothing_changed(own_copy: lumihull.Capture) -> None:
     results = {r.stage: r for r in own_copy.run()}
     assert list(results) == lumihull.stage_names()

@@ -1,9 +1,11 @@
 #include <lumihull/base/capture.h>
 #include <lumihull/base/export.h>
+#include <lumihull/base/files.h>
 #include <lumihull/base/import.h>
 #include <lumihull/calib/target_tracks.h>
 #include <lumihull/slf/pipeline.h>
 #include <lumihull/slf/results.h>
+#include <lumihull/slf/truth.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
@@ -158,7 +160,20 @@ void bind_stages(py::module_& module, py::class_<Capture>& c) {
            }),
            "The hull's mesh.")
       .def("evaluation", guarded([](const Capture& self) { return json_loads(slf::read_evaluation(self)); }),
-           "What the stage \"evaluate\" found.");
+           "What the stage \"evaluate\" found.")
+      .def("compare_with_truth",
+           guarded([](const Capture& self, const std::filesystem::path& truth,
+                      const std::optional<std::filesystem::path>& page, const py::object& progress, unsigned threads) {
+             const std::string json = work(progress, threads, [&](Job& job) {
+               const slf::TruthComparison comparison = slf::compare_with_truth(self, truth, {}, job);
+               if (page) write_file(*page, slf::truth_html(self, comparison, job));
+               return comparison.to_json();
+             });
+             return json_loads(json);
+           }),
+           "truth"_a, py::kw_only(), "page"_a = py::none(), "progress"_a = py::none(), "threads"_a = 0,
+           "Poses, lenses, targets, masks, surface and new views beside a folder of truth as the virtual rig writes it; "
+           "what either side lacks is in \"left_out\". page: an HTML file to write.");
 }
 
 template <class Options>

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "noise.h"
+#include "scattering.h"
 
 namespace lumihull::rig {
 
@@ -41,7 +42,6 @@ class Scatter {
       design.validate();
       out_.set.designs.push_back(design);
     }
-    ids_ = out_.set.designs[0].family.ids();
   }
 
   RoomTargets run() {
@@ -55,10 +55,7 @@ class Scatter {
   }
 
  private:
-  double width(Size size) const {
-    const calib::TargetDesign& design = out_.set.designs[size];
-    return (design.family.grid() + 1) * design.size_m;
-  }
+  double width(Size size) const { return sheet_width(out_.set.designs[size]); }
 
   double clear_of_object() const {
     double foot = scene_.enclosure.pedestal_radius;
@@ -71,21 +68,11 @@ class Scatter {
 
   /// A sheet whose middle is at `at`; x, y: the directions of the print before it is turned a little.
   void place(Size size, const Vector3d& at, const Vector3d& x, const Vector3d& y, const char* where) {
-    if (out_.placed.size() >= ids_.size())
-      throw Error(ErrorCode::invalid_argument, "more sheets than ids: choose a larger spacing or larger circles",
-                  "targets");
     Matrix3d axes;
     axes << x, y, x.cross(y);
-    const int id = ids_[out_.placed.size()];
-    const Pose world_from_target =
-        Pose::from_matrix(axes * Eigen::AngleAxisd(kAskew * random(), Vector3d::UnitZ()).toRotationMatrix(), at);
-    FlatPrint print = print_of(out_.set.designs[size], id);
-    print.world_from_print = world_from_target;
-    out_.prints.push_back(std::move(print));
-    out_.placed.push_back({size, id, world_from_target});
-    char name[32];
-    std::snprintf(name, sizeof name, "%s-%04d", where, id);
-    out_.set.boards.push_back({name, {{size, id, Pose{}}}});
+    hang(out_, size,
+         Pose::from_matrix(axes * Eigen::AngleAxisd(kAskew * random(), Vector3d::UnitZ()).toRotationMatrix(), at),
+         where);
   }
 
   /// Middles of cells of a grid over [0, length], each with what is left to move within it.
@@ -134,11 +121,54 @@ class Scatter {
   const Scene& scene_;
   const TargetSheetOptions& options_;
   RoomTargets out_;
-  std::span<const int> ids_;
   std::uint64_t draws_ = 0;
 };
 
 }  // namespace
+
+double sheet_width(const calib::TargetDesign& design) { return (design.family.grid() + 1) * design.size_m; }
+
+void hang(RoomTargets& targets, int design, const Pose& world_from_target, const char* where) {
+  const calib::TargetDesign& as_printed = targets.set.designs[std::size_t(design)];
+  const std::span<const int> ids = as_printed.family.ids();
+  if (targets.placed.size() >= ids.size())
+    throw Error(ErrorCode::invalid_argument, "more sheets than ids: choose a larger spacing or larger circles",
+                "targets");
+  const int id = ids[targets.placed.size()];
+  FlatPrint print = print_of(as_printed, id);
+  print.world_from_print = world_from_target;
+  targets.prints.push_back(std::move(print));
+  targets.placed.push_back({design, id, world_from_target});
+  char name[32];
+  std::snprintf(name, sizeof name, "%s-%04d", where, id);
+  targets.set.boards.push_back({name, {{design, id, Pose{}}}});
+}
+
+std::optional<Pose> free_place(const RoomTargets& targets, const Scene& scene, int design, const RoomHit& at,
+                               double askew) {
+  const Enclosure& room = scene.enclosure;
+  const double reach = sheet_width(targets.set.designs[std::size_t(design)]) / std::sqrt(2.);  // of a corner
+  const Vector3d place = at.point.cast<double>();
+  Matrix3d axes;
+  if (at.surface == Room::kFloor) {
+    const double turn = kPi * askew;
+    axes << Vector3d(std::cos(turn), std::sin(turn), 0), Vector3d(std::sin(turn), -std::cos(turn), 0),
+        -Vector3d::UnitZ();
+    if (place.head<2>().norm() < room.pedestal_radius + reach || place.head<2>().norm() > room.radius - reach)
+      return std::nullopt;
+  } else {
+    const Vector3d out = -at.normal.cast<double>(), y(0, 0, -1), x = y.cross(out);
+    const double across = x.dot(place), half = room.radius * std::tan(kPi / room.panels);
+    if (std::fabs(across) > half - reach || place.z() < reach || place.z() > room.height - reach) return std::nullopt;
+    axes << x, y, out;
+    axes = axes * Eigen::AngleAxisd(kAskew * askew, Vector3d::UnitZ()).toRotationMatrix();
+  }
+  for (const PlacedTarget& other : targets.placed) {
+    const double apart = reach + sheet_width(targets.set.designs[std::size_t(other.design)]) / std::sqrt(2.);
+    if ((other.world_from_target.translation - place).squaredNorm() < apart * apart) return std::nullopt;
+  }
+  return Pose::from_matrix(axes, place);
+}
 
 RoomTargets scatter_targets(const Scene& scene, const Camera& camera, double distance,
                             const TargetSheetOptions& options) {
