@@ -23,6 +23,8 @@ typedef struct lh_mechanism lh_mechanism;
 LH_API lh_status lh_mechanism_load(lh_context *ctx, const char *file, lh_mechanism **out);
 /** Six cables in a room of 10 x 12 x 6 m, the object's centre 1 m above the floor. */
 LH_API lh_status lh_mechanism_paper(lh_context *ctx, lh_mechanism **out);
+/** Six cables in a room of 16 x 18 x 10 m: for views from 2.7 m. */
+LH_API lh_status lh_mechanism_large(lh_context *ctx, lh_mechanism **out);
 LH_API lh_status lh_mechanism_save(lh_context *ctx, const lh_mechanism *mechanism, const char *file);
 /** NULL is allowed. */
 LH_API void lh_mechanism_destroy(lh_mechanism *mechanism);
@@ -341,6 +343,7 @@ typedef struct lh_plan_report {
   double median_fill;     /**< of the picture by the object, along its tighter direction */
   double least_tension_N, greatest_tension_N; /**< over all stops; 0 without a mechanism */
   double least_clearance_m;
+  int64_t cables_in_picture; /**< photographs in which a cable may be seen; -1: the lens model ends before a corner */
 } lh_plan_report;
 LH_API lh_status lh_plan_judge(lh_context *ctx, const lh_plan *plan, const lh_camera *camera,
                                const lh_object_size *object, const double center[3], lh_plan_report *out);

@@ -1,4 +1,5 @@
 #include <lumihull/capture/clearance.h>
+#include <lumihull/capture/design.h>
 #include <lumihull/capture/forward.h>
 #include <lumihull/capture/sensitivity.h>
 #include <lumihull/capture/statics.h>
@@ -65,6 +66,13 @@ lh_status lh_mechanism_paper(lh_context* ctx, lh_mechanism** out) {
   return guarded(ctx, [&] {
     given(out, "out");
     give(out, capture::paper_mechanism());
+  });
+}
+
+lh_status lh_mechanism_large(lh_context* ctx, lh_mechanism** out) {
+  return guarded(ctx, [&] {
+    given(out, "out");
+    give(out, capture::large_mechanism());
   });
 }
 

@@ -240,6 +240,7 @@ lh_status lh_plan_judge(lh_context* ctx, const lh_plan* plan, const lh_camera* c
     value.least_tension_N = r.least_tension_N;
     value.greatest_tension_N = r.greatest_tension_N;
     value.least_clearance_m = r.least_clearance_m;
+    value.cables_in_picture = r.cables_known ? int64_t(r.cables_in_picture.size()) : -1;
     write_struct(out, value, "out");
   });
 }

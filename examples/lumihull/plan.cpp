@@ -3,6 +3,7 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
 #include <lumihull/calib/lens_calibration.h>
+#include <lumihull/capture/design.h>
 #include <lumihull/capture/experiments.h>
 #include <lumihull/capture/optics.h>
 #include <lumihull/capture/plan_report.h>
@@ -160,6 +161,11 @@ void say(Program& program, const Arguments& a, const PlannedTour& tour, const Pl
     program.say("note      the object is cut off at " + std::to_string(r.cut_off.size()) + " stops (" +
                 some(r.cut_off) +
                 (std::isfinite(r.least_margin_px) ? formatted("), by up to %.0f px", -r.least_margin_px) : ")"));
+  if (!r.cables_in_picture.empty())
+    program.say("note      a cable may be seen in " + std::to_string(r.cables_in_picture.size()) +
+                " photographs: " + some(r.cables_in_picture));
+  if (!r.cables_known)
+    program.say("note      whether cables are seen is not known: the lens model ends before the picture's corners");
   if (r.least_targets >= 0)
     program.say("targets   at least " + std::to_string(r.least_targets) + ", in the middle " +
                 std::to_string(r.median_targets));
@@ -210,7 +216,8 @@ std::string json_of(const Arguments& a, const PlannedTour& tour, const PlanRepor
   if (tour.plan.mechanism)
     text += ", \"least_tension_N\": " + json_number(r.least_tension_N) +
             ", \"greatest_tension_N\": " + json_number(r.greatest_tension_N) +
-            ", \"least_clearance_m\": " + json_number(r.least_clearance_m);
+            ", \"least_clearance_m\": " + json_number(r.least_clearance_m) +
+            ", \"cables_in_picture\": " + (r.cables_known ? json_list(r.cables_in_picture) : "null");
   if (r.least_targets >= 0)
     text += ", \"least_targets\": " + std::to_string(r.least_targets) +
             ", \"median_targets\": " + std::to_string(r.median_targets);
@@ -230,7 +237,8 @@ void draw(Program& program, const Arguments& a, const Plan& plan) {
 }
 
 Mechanism mechanism_of(const Arguments& a) {
-  return a.mechanism == "paper" ? paper_mechanism() : read_mechanism(a.mechanism);
+  if (a.mechanism == "paper") return paper_mechanism();
+  return a.mechanism == "large" ? large_mechanism() : read_mechanism(a.mechanism);
 }
 
 /// How well the robot comes back: no object, no hemisphere.
@@ -318,7 +326,9 @@ void add_plan(Program& program) {
                    [&program, a] { run(program, *a); });
   verb->add_option("--robot", a->robot, "what carries the camera [cables]")
       ->check(CLI::IsMember({"cables", "turntable", "hand"}));
-  verb->add_option("--mechanism", a->mechanism, "the cables: a file, or \"paper\" [paper]")->type_name("FILE|paper");
+  verb->add_option("--mechanism", a->mechanism,
+                   "the cables: a file, \"paper\", or \"large\" for radii to 2.7 m [paper]")
+      ->type_name("FILE|paper|large");
   verb->add_option("--object-diameter", a->object.diameter_m,
                    "of an upright cylinder, or a sphere, that holds the object, m");
   verb->add_option("--object-height", a->object.height_m, "of that cylinder, m; 0: a sphere [0]");

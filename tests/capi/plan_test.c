@@ -168,6 +168,7 @@ static void turntable(lh_context *ctx) {
   memset(&report, 0, sizeof report);
   report.struct_size = sizeof report;
   MUST(ctx, lh_plan_judge(ctx, plan, &camera, &ball, center, &report));
+  CHECK(report.cables_in_picture >= 0 && (size_t)report.cables_in_picture <= report.photographs);
   CHECK(report.photographs == 24 && report.cut_off == 0 && report.least_margin_px > 0);
   NEAR(report.median_fill, 0.8, 0.01);
   ball.diameter_m = 0.5;

@@ -339,6 +339,9 @@ int main(int argc, char **argv) {
   wrong_use(ctx, mechanism);
   calibration(ctx, mechanism);
   lh_mechanism_destroy(mechanism);
+  MUST(ctx, lh_mechanism_large(ctx, &mechanism));
+  CHECK(lh_mechanism_cable_count(mechanism) == 6);
+  lh_mechanism_destroy(mechanism);
   lh_context_destroy(ctx);
   return check_result();
 }

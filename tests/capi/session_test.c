@@ -235,9 +235,99 @@ static void wrong_use(lh_context *ctx, const lh_plan *plan, const char *folder) 
   end(&s);
 }
 
+/* Devices of the library's own: each session opens them anew, and what is simulated remembers. */
+static void by_words(lh_context *ctx, const lh_plan *plan, const char *folder) {
+  lh_robot *robot = NULL;
+  lh_camera_device *camera = NULL, *serial = NULL;
+  Scene s;
+  begin(ctx, &s);
+  MUST(ctx, lh_robot_by_word(ctx, "simulate", &robot));
+  MUST(ctx, lh_camera_device_by_word(ctx, "simulate", &camera));
+  MUST(ctx, lh_camera_device_by_word(ctx, "serial", &serial));
+  s.options.agree_to_motion = 1;
+  s.options.pause_after = 3;
+  MUST(ctx, lh_session_run(ctx, plan, robot, &camera, 1, folder, &s.options, NULL, &s.result));
+  CHECK(s.result.taken == 3 && s.result.paused == 1);
+  EXPECT(ctx, LH_EINVAL, lh_session_run(ctx, plan, robot, &serial, 1, folder, &s.options, NULL, &s.result));
+  CHECK_SAYS(ctx, "no serial port");
+  /* An application's own robot with the library's camera. */
+  MUST(ctx, lh_session_run(ctx, plan, s.robot, &camera, 1, folder, &s.options, &s.who, &s.result));
+  CHECK(s.result.taken == 1 && s.result.views == kStops && s.rig.moves == 1);
+  lh_robot_destroy(robot);
+  lh_camera_device_destroy(camera);
+  lh_camera_device_destroy(serial);
+  end(&s);
+}
+
+static void count_lines(void *user, const char *line) { *(int *)user += line[0] != '\0'; }
+
+/* A camera that a person fires keeps its pictures on a card; they carry no time, so that their order tells. */
+static void card(lh_context *ctx, const lh_plan *plan, const char *folder, const char *pictures) {
+  lh_camera_device *camera = NULL;
+  lh_card_options options;
+  lh_card_result result;
+  lh_capture *capture = NULL;
+  char text[256];
+  int lines = 0;
+  Scene s;
+  begin(ctx, &s);
+  MUST(ctx, lh_camera_device_by_word(ctx, "hand", &camera));
+  MUST(ctx, lh_session_run(ctx, plan, s.robot, &camera, 1, folder, NULL, &s.who, &s.result));
+  CHECK(s.result.awaited == kStops && s.result.views == 0);
+  memset(&options, 0, sizeof options);
+  options.struct_size = sizeof options;
+  options.user = &lines;
+  options.tell = count_lines;
+  options.dry_run = 1;
+  memset(&result, 0, sizeof result);
+  result.struct_size = sizeof result;
+  MUST(ctx, lh_card_land(ctx, folder, pictures, &options, &result));
+  CHECK(result.matched == kStops && result.landed == 0 && result.missing == 0 && lines >= kStops);
+  options.dry_run = 0;
+  MUST(ctx, lh_card_land(ctx, folder, pictures, &options, &result));
+  CHECK(result.landed == kStops && result.extra == 0 && result.troubles == 0);
+  MUST(ctx, lh_card_land(ctx, folder, pictures, NULL, &result)); /* all are there */
+  CHECK(result.matched == 0 && result.landed == 0);
+  MUST(ctx, lh_capture_open(ctx, folder, &capture));
+  CHECK(lh_capture_shot_count(capture) == kStops);
+  EXPECT(ctx, LH_EINPUT, lh_repeatability(ctx, capture, text, sizeof text, NULL));
+  CHECK_SAYS(ctx, "no scale");
+  lh_capture_destroy(capture);
+  options.camera = "other";
+  EXPECT(ctx, LH_EINVAL, lh_card_land(ctx, folder, pictures, &options, NULL));
+  EXPECT(ctx, LH_ENOTFOUND, lh_card_land(ctx, folder, "/nowhere", NULL, NULL));
+  EXPECT(ctx, LH_EINVAL, lh_card_land(ctx, NULL, pictures, NULL, NULL));
+  lh_camera_device_destroy(camera);
+  end(&s);
+}
+
+static void experiments(lh_context *ctx) {
+  enum { kFrames = 200 };
+  static double time_s[kFrames], center[2 * kFrames], distance[kFrames];
+  double poses[24] = {1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1.5, 0, 1, 0, 0, 0, 0, 1, 0};
+  double mean[12], far[2], settle = 0, rest = 0;
+  int i;
+  MUST(ctx, lh_pose_spread(ctx, poses, 2, mean, far, NULL));
+  CHECK(fabs(mean[3] - 1) < 1e-12 && fabs(far[0] - 0.5) < 1e-12 && fabs(far[1] - 0.5) < 1e-12);
+  EXPECT(ctx, LH_EINVAL, lh_pose_spread(ctx, poses, 0, mean, NULL, NULL));
+  poses[0] = 2;
+  EXPECT(ctx, LH_EINVAL, lh_pose_spread(ctx, poses, 2, mean, NULL, NULL));
+  for (i = 0; i < kFrames; ++i) {
+    time_s[i] = 0.05 * i;
+    center[2 * i] = 100 + 8 * exp(-time_s[i]); /* within 0.5 px from ln 16 = 2.77 s on */
+    center[2 * i + 1] = 50;
+  }
+  MUST(ctx, lh_stability(ctx, time_s, center, kFrames, 0, 0, distance, &settle, &rest));
+  CHECK(fabs(settle - 2.8) < 1e-9 && fabs(distance[0] - 8) < 0.01 && rest < 0.01);
+  MUST(ctx, lh_stability(ctx, time_s, center, kFrames, 1e-9, 0, NULL, &settle, NULL));
+  CHECK(settle == -1);
+  EXPECT(ctx, LH_EINVAL, lh_stability(ctx, time_s, center, 2, 0, 0, NULL, NULL, NULL));
+  EXPECT(ctx, LH_EINVAL, lh_stability(ctx, NULL, center, kFrames, 0, 0, NULL, NULL, NULL));
+}
+
 int main(int argc, char **argv) {
   const char *scratch = argc > 1 ? argv[1] : ".";
-  char folder[1024];
+  char folder[1024], pictures[1024];
   lh_plan *plan;
   lh_context *ctx = lh_context_create();
   if (!ctx) return 1;
@@ -248,6 +338,12 @@ int main(int argc, char **argv) {
   faults(ctx, plan, folder);
   snprintf(folder, sizeof folder, "%s/session_none", scratch);
   wrong_use(ctx, plan, folder);
+  snprintf(folder, sizeof folder, "%s/session_words", scratch);
+  by_words(ctx, plan, folder);
+  snprintf(folder, sizeof folder, "%s/session_card", scratch);
+  snprintf(pictures, sizeof pictures, "%s/session/photos", scratch);
+  card(ctx, plan, folder, pictures);
+  experiments(ctx);
   lh_plan_destroy(plan);
   lh_context_destroy(ctx);
   return check_result();

@@ -229,5 +229,26 @@ TEST(MechanismFigures, AreSvgWithWhatTheyShow) {
   EXPECT_EQ(expect_error([&] { draw_tensions(report, m, -1); }).code(), ErrorCode::invalid_argument);
 }
 
+TEST(LargeMechanism, ServesTheLargestRadiusOfThePaper) {
+  Job job;
+  const Mechanism m = large_mechanism();
+  EXPECT_NO_THROW(check(m));
+  const KeepOut snowmobile{{0, 0, -1}, 1.5, 0.35};
+  for (const double radius : {2.0, 2.7}) {
+    Workspace w;
+    w.radius_m = radius;
+    ASSERT_EQ(w.size(), 240u);
+    KeepOut object = snowmobile;
+    object.radius_m *= radius / 2.7;
+    const WorkspaceReport report = examine(m, w, &object, job);
+    EXPECT_EQ(report.coverage(1, 0.04), 1) << radius;
+    EXPECT_EQ(report.paper_objective(), -240) << radius;
+    for (const PoseReport& p : report.poses) {
+      EXPECT_LT(p.tensions.tension_N.maxCoeff(), 30);
+      EXPECT_GT(p.clearance.cable_object, 0.15);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace lumihull::capture

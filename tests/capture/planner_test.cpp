@@ -223,6 +223,34 @@ TEST(Planner, ReportsWhatThePicturesShow) {
   EXPECT_FALSE(large.cut_off.empty());
   EXPECT_LT(large.least_margin_px, 0);
   EXPECT_EQ(large.least_targets, -1);
+
+  // Cables in pictures: those of which a sampled point is projected into one, and hardly others.
+  const Camera wide = ideal_camera({.focal_length_mm = 10}, 1.5);
+  for (const Camera& c : {camera, wide}) {
+    const std::vector<std::string> told = report(plan, c, {0.7, 0.5}, Vector3d::Zero()).cables_in_picture;
+    std::size_t seen = 0;
+    for (const PlannedStop& stop : plan.stops) {
+      bool in_picture = false;
+      for (const Cable& cable : plan.mechanism->cables)
+        for (int k = 0; k <= 400 && !in_picture; ++k) {
+          const Vector3d tip = stop.world_from_platform * cable.attachment,
+                         at = stop.cam_from_world * Vector3d(tip + k / 400.0 * (cable.departure - tip));
+          const auto pixel = c.project(at);
+          in_picture =
+              at.z() > 1e-3 && pixel && pixel->minCoeff() >= 0 && pixel->x() <= c.width && pixel->y() <= c.height;
+        }
+      if (!stop.photograph || !in_picture) continue;
+      ++seen;
+      EXPECT_THAT(told, testing::Contains(stop.name));
+    }
+    EXPECT_LE(told.size(), seen + seen / 20 + 1) << seen;
+    if (c.f == wide.f) {
+      EXPECT_GT(seen, 0u) << "a lens of 10 mm sees cables";
+    }
+  }
+  Camera narrow = camera;
+  narrow.k1 = -3;
+  EXPECT_FALSE(report(plan, narrow, {0.7, 0.5}, Vector3d::Zero()).cables_known);
   for (const std::string& svg :
        {plan_from_above_svg(plan), plan_from_side_svg(plan), plan_tensions_svg(plan), plan_time_svg(plan)}) {
     EXPECT_TRUE(svg.starts_with("<svg"));

@@ -391,5 +391,42 @@ TEST(SessionFaults, CancelledWhileSettlingAndWhileExposing) {
   EXPECT_EQ(scene.who.count(About::doubt), 0u);
 }
 
+TEST(SessionFaults, AMoveOfAKilledSessionIsStoppedFirst) {
+  /// On its way until it is told to stop, which takes three looks.
+  struct OnItsWay : SimulatedRobot {
+    using SimulatedRobot::SimulatedRobot;
+    State state() override {
+      State now = SimulatedRobot::state();
+      now.moving = !stopped || looks-- > 0;
+      return now;
+    }
+    void make_safe() noexcept override {
+      stopped = true;
+      SimulatedRobot::make_safe();
+    }
+    void move_to(const PlannedStop& stop, Job& job) override {
+      EXPECT_TRUE(stopped && looks < 0);
+      SimulatedRobot::move_to(stop, job);
+    }
+    bool stopped = false;
+    int looks = 3;
+  };
+  const test::TemporaryFolder folder;
+  OnItsWay robot({.time_scale = 1, .memory = {}});
+  SimulatedCamera camera({.list = folder / "list", .card = {}}, &robot);
+  CameraDevice* cameras[] = {&camera};
+  test::ScriptedOperator who;
+  Job job;
+  const Plan plan = test::turntable_plan(2);
+  EXPECT_EQ(capture::capture(plan, robot, cameras, folder / "c", {}, who, job).views, 2u);
+  EXPECT_THAT(who.told, testing::Contains(HasSubstr("it was stopped")));
+  // One that does not stop is a problem.
+  OnItsWay runaway({.time_scale = 1, .memory = {}});
+  runaway.looks = 1'000'000;
+  const std::string why =
+      test::expect_error([&] { capture::capture(plan, runaway, cameras, folder / "d", {}, who, job); }).message();
+  EXPECT_THAT(why, HasSubstr("is moving"));
+}
+
 }  // namespace
 }  // namespace lumihull::capture

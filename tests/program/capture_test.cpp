@@ -1,10 +1,14 @@
 // lumihull capture: simulated devices through a plan; stopped, killed, gone on with; the firmware as the robot.
 #include <lumihull/base/capture.h>
 #include <lumihull/base/files.h>
+#include <lumihull/capture/serial.h>
+#include <lumihull/capture/session.h>
+#include <lumihull/capture/trajectory.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "../capture/serial_simulator.h"
 #include "process.h"
 #include "support.h"
 
@@ -102,6 +106,70 @@ TEST_F(CaptureVerb, WrongWordsAreErrors) {
   const auto no_plan = lumihull({"capture", mine("new"), "--robot", "simulate", "--camera", "simulate"});
   EXPECT_EQ(no_plan.status, 2);
   EXPECT_THAT(no_plan.err, HasSubstr("--plan"));
+}
+
+/// Stops a hand's breadth apart, so that winches are quick.
+capture::Plan short_hops() {
+  capture::Plan plan;
+  plan.robot = "cables";
+  plan.mechanism = capture::paper_mechanism();
+  plan.cameras = {"main"};
+  for (int i = 0; i < 6; ++i) {
+    const Pose pose{Eigen::Quaterniond::Identity(), {0.04 * i, 0.02 * (i % 2), 1.5}};
+    capture::PlannedStop stop = capture::platform_stop(*plan.mechanism, Eigen::Vector3d::Zero(), pose, 0);
+    stop.name = "s" + std::to_string(i);
+    stop.travel_s = i > 0 ? 1 : 0;
+    stop.settle_s = 0;
+    stop.exposure_s = 0.05;
+    plan.stops.push_back(stop);
+  }
+  return plan;
+}
+
+TEST_F(CaptureVerb, DrivesTheFirmwareAndGoesOnAfterKills) {
+  const test::SerialSimulator simulator({"--speed", "2"});
+  const capture::Plan plan = short_hops();
+  capture::write_plan(plan, mine("hops.json"));
+  const auto run = [&](std::vector<std::string> more, double kill_after_s) {
+    std::vector<std::string> words{
+        "capture",  mine("hops"), "--plan",  mine("hops.json"), "--robot", "serial:" + simulator.device(),
+        "--camera", "serial",     "--quiet", "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return lumihull(words, {.kill_after_s = kill_after_s});
+  };
+  const auto lost = run({"--yes"}, 0);  // a controller that was just switched on does not know where the platform is
+  EXPECT_NE(lost.status, 0);
+  EXPECT_THAT(lost.err, HasSubstr("position"));
+  {
+    const auto robot =
+        capture::open_serial_robot(capture::open_serial_link({.device = simulator.device()}), *plan.mechanism);
+    robot->declare_position(plan.stops.front());
+  }
+  std::size_t kills = 0;
+  test::Outcome outcome;
+  for (; kills < 12; ++kills) {
+    outcome = run({"--yes"}, .7 + .35 * double(kills));
+    if (outcome.status != 128 + 9) break;
+  }
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_GT(kills, 0u);
+  const auto result = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(result["views"], 0);
+  EXPECT_EQ(result["awaited"], plan.stops.size()) << "its files are on the camera's card";
+  // What the controller did: each exposure once, for its time.
+  const capture::JournalState journal = capture::read_journal(capture::journal_path(mine("hops")));
+  const auto shots = test::true_shots(simulator.log(), journal.last_id + 1);
+  std::size_t begun = 0;
+  for (const test::TrueShot& shot : shots) {
+    EXPECT_LE(shot.begun, 1u);
+    begun += shot.begun;
+  }
+  EXPECT_EQ(begun, plan.stops.size());
+  for (const capture::ShotProgress& shot : journal.shots) {
+    EXPECT_EQ(shot.step, capture::ShotStep::done);
+    EXPECT_TRUE(shots[shot.take.shot].whole) << shot.take.shot;
+    EXPECT_EQ(shots[shot.take.shot].ms, 50u);
+  }
 }
 
 }  // namespace

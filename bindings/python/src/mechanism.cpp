@@ -1,5 +1,6 @@
 // The robot's mechanism and its calibration, on NumPy's arrays.
 #include <lumihull/capture/clearance.h>
+#include <lumihull/capture/design.h>
 #include <lumihull/capture/forward.h>
 #include <lumihull/capture/mechanism_calibration.h>
 #include <lumihull/capture/sensitivity.h>
@@ -146,6 +147,7 @@ void bind_files_and_parts(py::class_<Mechanism>& type) {
           },
           "file"_a, "From a mechanism.json.")
       .def_static("paper", &paper_mechanism, "Six cables in a room of 10 x 12 x 6 m, the object 1 m above the floor.")
+      .def_static("large", &large_mechanism, "Six cables in a room of 16 x 18 x 10 m: for views from 2.7 m.")
       .def(
           "save",
           [](const Mechanism& m, const std::filesystem::path& file) {

@@ -233,7 +233,8 @@ void bind_plan_type(py::module_& module) {
             return py::dict("photographs"_a = r.photographs, "cut_off"_a = r.cut_off,
                             "least_margin_px"_a = r.least_margin_px, "median_fill"_a = r.median_fill,
                             "least_tension_N"_a = r.least_tension_N, "greatest_tension_N"_a = r.greatest_tension_N,
-                            "least_clearance_m"_a = r.least_clearance_m);
+                            "least_clearance_m"_a = r.least_clearance_m,
+                            "cables_in_picture"_a = r.cables_known ? py::cast(r.cables_in_picture) : py::none());
           },
           "camera"_a, "diameter_m"_a, "height_m"_a = 0.0, "center"_a = std::vector<double>{0, 0, 0},
           "What its photographs will show of an object, and what it asks of the mechanism.");

@@ -66,8 +66,7 @@ LengthTerm cable_length_term(const Cable& cable, const Pose& pose, double factor
   term.length_m = e.norm();
   if (!(term.length_m > kShortest_m)) fail_without_direction(cable);
   const Eigen::Vector3d v = e / term.length_m;
-  term.gradient.head<3>() = v;
-  term.gradient.tail<3>() = c.cross(v);
+  term.gradient << v, c.cross(v);
   if (hessian) {
     // Through J = [I, -[c]x]: e turns against its own direction ((I - v vᵀ) / l), and exp bends the attachment's way.
     const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - v * v.transpose()) / term.length_m;
@@ -85,8 +84,7 @@ PotentialTerm gravity_term(const Mechanism& mechanism, const Pose& pose, Matrix6
   const Eigen::Vector3d s = pose.rotation * mechanism.center_of_mass, up = Eigen::Vector3d::UnitZ();
   PotentialTerm term;
   term.energy_J = weight * (pose.translation.z() + s.z());
-  term.gradient.head<3>() = weight * up;
-  term.gradient.tail<3>() = weight * s.cross(up);
+  term.gradient << weight * up, weight * s.cross(up);
   if (hessian) hessian->bottomRightCorner<3, 3>() += weight * turning(s, up);
   return term;
 }

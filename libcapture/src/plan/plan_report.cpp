@@ -1,3 +1,4 @@
+#include <lumihull/base/error.h>
 #include <lumihull/capture/plan_report.h>
 
 #include <algorithm>
@@ -13,6 +14,17 @@ T median(std::vector<T> values) {
   const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+void look_for_cables(const Mechanism& mechanism, const PlannedStop& stop, const Camera& camera, PlanReport& r) {
+  try {
+    if (!cables_in_picture(mechanism, stop.world_from_platform, camera, stop.cam_from_world).empty())
+      r.cables_in_picture.push_back(stop.name);
+  } catch (const Error& e) {
+    if (e.code() != ErrorCode::degenerate) throw;
+    r.cables_known = false;
+    r.cables_in_picture.clear();
+  }
 }
 
 }  // namespace
@@ -44,6 +56,7 @@ PlanReport report(const Plan& plan, const Camera& camera, const ObjectSize& obje
     r.least_margin_px = std::min(r.least_margin_px, framed.least_margin_px);
     if (!framed.whole) r.cut_off.push_back(stop.name);
     fills.push_back(framed.fill);
+    if (plan.mechanism && r.cables_known) look_for_cables(*plan.mechanism, stop, camera, r);
     if (targets.empty()) continue;
     seen.push_back(targets_in_view(view, targets, object, center));
     if (seen.back() < kLeastTargets) r.few_targets.push_back(stop.name);

@@ -52,6 +52,19 @@ class SafeEnd {
   std::span<CameraDevice* const> cameras_;
 };
 
+/// The last move of a session that was killed may still be under way, with nobody who watches over it.
+void end_old_move(Robot& robot, Operator& who, Job& job) {
+  constexpr double kPatience_s = 5;
+  try {
+    if (!robot.state().moving) return;
+    robot.make_safe();
+    who.tell("the robot was still on the way of an earlier session; it was stopped");
+    for (const auto start = Clock::now(); robot.state().moving && seconds_since(start) < kPatience_s;) wait(0.05, job);
+  } catch (const Error& e) {
+    if (e.code() == ErrorCode::cancelled) throw;  // the dry run finds all else
+  }
+}
+
 class Session {
  public:
   Session(const Plan& plan, Robot& robot, std::span<CameraDevice* const> cameras, const fs::path& folder,
@@ -460,6 +473,7 @@ class Session {
 SessionResult capture(const Plan& plan, Robot& robot, std::span<CameraDevice* const> cameras, const fs::path& folder,
                       const SessionOptions& options, Operator& who, Job& job) {
   const SafeEnd safe_end(robot, cameras);
+  end_old_move(robot, who, job);
   const DryRun checked = dry_run(plan, robot, cameras, folder, options);
   if (!checked.problems.empty())
     throw Error(

@@ -45,4 +45,9 @@ struct MechanismDesign {
 /// seed, not on the number of threads. Errors: invalid_argument (options or base out of range), cancelled.
 LUMIHULL_API MechanismDesign design_mechanism(const Mechanism& base, const DesignOptions& options, Job& job);
 
+/// A found design for the paper's largest radius (table 1: 2.7 m), in a room of 16 x 18 x 10 m, the object's centre 1 m
+/// above the floor: 240 views at the paper's tilt are controlled, with at least 1 N, 15 cm between cables and an object
+/// of 1.5 m radius and 4 cm between cables (src/design/README.md).
+LUMIHULL_API Mechanism large_mechanism();
+
 }  // namespace lumihull::capture

@@ -24,6 +24,10 @@ struct PlanReport {
 
   double least_tension_N = 0, greatest_tension_N = 0;  ///< over all stops; 0 without a mechanism
   double least_clearance_m = 0;
+
+  std::vector<std::string> cables_in_picture;  ///< stops in whose picture a cable may be seen
+  /// false: not known, for a corner of the picture lies beyond the lens model's domain.
+  bool cables_known = true;
 };
 
 constexpr int kLeastTargets = 5;
