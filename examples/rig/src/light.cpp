@@ -127,11 +127,12 @@ void LitScene::light_room(const LightOptions& options, Job& job) {
         for (std::size_t i = first; i < last; ++i) {
           const RoomHit& at = nodes[i].at;
           const Eigen::Matrix3f frame = frame_around(at.normal);
+          // Maps are rectangles that reach beyond walls; what is there counts for places beside them.
+          const Vector3f start = room_.moved_inside(at.point + offset_ * at.normal, offset_);
           Vector3f sum = Vector3f::Zero();
           for (int k = 0; k < options.ambient_rays; ++k)
-            sum += path_light(
-                {at.point + offset_ * at.normal, frame * cosine_direction(spread_point(k, options.ambient_rays, 2))},
-                nullptr, mix(3, std::uint64_t(k)), options.bounces, false);
+            sum += path_light({start, frame * cosine_direction(spread_point(k, options.ambient_rays, 2))}, nullptr,
+                              mix(3, std::uint64_t(k)), options.bounces, false);
           indirect[i] = sum / float(options.ambient_rays);
         }
       },
@@ -157,7 +158,9 @@ void LitScene::look_at_materials() {
       if (m.unlit)
         glow_[v] = m.colors[0];
       else
-        albedo_[v] = (1 - mean_mirror(m)) * base_color(part, m, corner, mesh_.vertices[v]);
+        // What it mirrors is scattered here: energy is kept, its direction is not.
+        albedo_[v] =
+            (1 - mean_mirror(m)) * base_color(part, m, corner, mesh_.vertices[v]) + Vector3f::Constant(mean_mirror(m));
     }
 }
 

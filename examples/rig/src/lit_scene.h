@@ -86,7 +86,7 @@ class LitScene {
   float offset_ = 0;  ///< how far shadow rays start from a surface, m
   hull::Mesh mesh_;   ///< all objects, vertices doubled along creases, triangles split to a light vertex spacing
   std::vector<Eigen::Vector3f> normals_, light_;  ///< one a vertex of mesh_
-  std::vector<Eigen::Vector3f> albedo_, glow_;    ///< of the diffuse part; what an unlit vertex radiates
+  std::vector<Eigen::Vector3f> albedo_, glow_;    ///< what it scatters; what an unlit vertex radiates
   std::vector<std::uint32_t> object_of_;
   std::vector<Part> parts_;
   std::optional<hull::RayScene> rays_;

@@ -38,6 +38,23 @@ bool Room::contains(const Vector3f& p) const {
   return !(p.z() <= enclosure_.pedestal_height && p.head<2>().norm() <= enclosure_.pedestal_radius);
 }
 
+Vector3f Room::moved_inside(Vector3f p, float margin) const {
+  const Enclosure& e = enclosure_;
+  p.z() = std::clamp(p.z(), margin, std::max(margin, e.height - margin));
+  for (const Vector3f& n : normals_) {
+    const float inside = e.radius + n.dot(p);
+    if (inside < margin) p += (margin - inside) * n;
+  }
+  const float out = p.head<2>().norm(), wide = e.pedestal_radius + margin;
+  if (p.z() <= e.pedestal_height && out < wide) {
+    if (out > 0)
+      p.head<2>() *= wide / out;
+    else
+      p.x() = wide;
+  }
+  return p;
+}
+
 bool Room::pedestal_hit(const Vector3f& o, const Vector3f& d, RoomHit& out) const {
   const float r = enclosure_.pedestal_radius, h = enclosure_.pedestal_height;
   if (r <= 0 || h <= 0) return false;

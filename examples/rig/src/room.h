@@ -27,6 +27,9 @@ class Room {
   int surfaces() const { return kPanels + enclosure_.panels; }
   bool contains(const Eigen::Vector3f& point) const;
 
+  /// A point that is inside, moved by as little as `margin` (m) asks for if it is not.
+  Eigen::Vector3f moved_inside(Eigen::Vector3f point, float margin) const;
+
   /// From a point inside; direction of any length.
   RoomHit hit(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
   /// How much of a look around `direction` (unit length) sees the ceiling, from 0 to 1: it fades from -blur to blur,
