@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
   bool plain = false, fast = false, fine = false, no_distortion = false, no_noise = false;
   app.add_option("-o,--output", output, "folder to make; must be new or empty")->required();
   app.add_option("--object", options.object,
-                 "vase, bust, statue, snowmobile, deer, gate, box, sphere, pebble, or a mesh file (.obj, .ply)")
+                 "vase, bust, statue, snowmobile, deer, gate, box, sphere, pebble, or a mesh file (.obj, .ply, .glb)")
       ->capture_default_str();
   app.add_option("--size", options.size_m, "longest side of the object, m")->capture_default_str();
   app.add_option("--photos", options.photos, "photographs of the object")->capture_default_str();

@@ -151,7 +151,8 @@ void LitScene::look_at_materials() {
       if (done[v]) continue;
       done[v] = true;
       const Part& part = parts_[object_of_[t]];
-      const Material& m = part.at(mesh_.vertices[v]);
+      const std::size_t material = part.material_index(mesh_.vertices[v], std::uint32_t(t));
+      const Material& m = part.materials[material];
       Hit corner;
       corner.triangle = std::uint32_t(t);
       corner.b1 = k == 1 ? 1.f : 0.f, corner.b2 = k == 2 ? 1.f : 0.f;
@@ -159,8 +160,8 @@ void LitScene::look_at_materials() {
         glow_[v] = m.colors[0];
       else
         // What it mirrors is scattered here: energy is kept, its direction is not.
-        albedo_[v] =
-            (1 - mean_mirror(m)) * base_color(part, m, corner, mesh_.vertices[v]) + Vector3f::Constant(mean_mirror(m));
+        albedo_[v] = (1 - mean_mirror(m)) * base_color(part, material, corner, mesh_.vertices[v]) +
+                     Vector3f::Constant(mean_mirror(m));
     }
 }
 

@@ -52,11 +52,20 @@ void LitScene::add(const Object& object, float vertex_spacing) {
   part.material_at = object.material_at;
   part.foot = Vector3f(0, 0, low.z());
   part.size = (high - low).maxCoeff();
-  part.texture = object.texture;
-  if (!object.texture.empty() && object.uv.size() != object.mesh.triangles.size())
+  part.textures = object.material_of.empty() ? std::vector<Image>{object.texture} : object.textures;
+  part.material_of = object.material_of;
+  if (!part.material_of.empty() &&
+      (part.material_of.size() != object.mesh.triangles.size() || part.textures.size() != part.materials.size() ||
+       *std::max_element(part.material_of.begin(), part.material_of.end()) >= part.materials.size()))
+    throw Error(ErrorCode::bad_input, "expected a material for each triangle, and a texture or none for each material",
+                object.name);
+  const bool textured =
+      std::any_of(part.textures.begin(), part.textures.end(), [](const Image& image) { return !image.empty(); });
+  if (textured && object.uv.size() != object.mesh.triangles.size())
     throw Error(ErrorCode::bad_input, "a texture needs coordinates for each triangle", object.name);
   ShadingMesh shape = shading_mesh(object, vertex_spacing * part.size);
   part.uv = std::move(shape.uv);
+  part.split = std::uint32_t(shape.mesh.triangles.size() / object.mesh.triangles.size());
   part.first_triangle = std::uint32_t(mesh_.triangles.size());
   const auto first_vertex = std::uint32_t(mesh_.vertices.size());
   mesh_.vertices.insert(mesh_.vertices.end(), shape.mesh.vertices.begin(), shape.mesh.vertices.end());
@@ -123,27 +132,29 @@ Vector3f LitScene::blurred_room(const Vector3f& from, const Vector3f& way, float
   return radiance;
 }
 
-const Material& LitScene::Part::at(const Vector3f& point) const {
-  if (!material_at) return materials[0];
-  return materials[std::size_t(std::clamp(material_at((point - foot) / size), 0, int(materials.size()) - 1))];
+std::size_t LitScene::Part::material_index(const Vector3f& point, std::uint32_t triangle) const {
+  if (!material_of.empty()) return material_of[(triangle - first_triangle) / split];
+  return material_at ? std::size_t(std::clamp(material_at((point - foot) / size), 0, int(materials.size()) - 1)) : 0;
 }
 
-Vector3f LitScene::base_color(const Part& part, const Material& material, const Hit& hit, const Vector3f& point) const {
-  if (part.texture.empty()) return pattern_color(material, (point - part.foot) / part.size);
+Vector3f LitScene::base_color(const Part& part, std::size_t material, const Hit& hit, const Vector3f& point) const {
+  const Image& texture = part.textures[part.material_of.empty() ? 0 : material];
+  if (texture.empty()) return pattern_color(part.materials[material], (point - part.foot) / part.size);
   const auto& uv = part.uv[hit.triangle - part.first_triangle];
   const Vector2f at = (1 - hit.b1 - hit.b2) * uv[0] + hit.b1 * uv[1] + hit.b2 * uv[2];
   const Vector2f wrapped = at - at.array().floor().matrix();
-  const int w = part.texture.width(), h = part.texture.height();
+  const int w = texture.width(), h = texture.height();
   const float x = wrapped.x() * float(w) - .5f, y = (1 - wrapped.y()) * float(h) - .5f;
   const int x0 = int(std::floor(x)), y0 = int(std::floor(y));
   const float a = x - float(x0), b = y - float(y0);
   const auto texel = [&](int i, int j) {
-    const std::uint8_t* p = part.texture.row<std::uint8_t>((j % h + h) % h) + 3 * ((i % w + w) % w);
+    const std::uint8_t* p = texture.row<std::uint8_t>((j % h + h) % h) + 3 * ((i % w + w) % w);
     return Vector3f(linear_from_srgb(float(p[0]) / 255), linear_from_srgb(float(p[1]) / 255),
                     linear_from_srgb(float(p[2]) / 255));
   };
-  return (1 - b) * ((1 - a) * texel(x0, y0) + a * texel(x0 + 1, y0)) +
-         b * ((1 - a) * texel(x0, y0 + 1) + a * texel(x0 + 1, y0 + 1));
+  const Vector3f color = (1 - b) * ((1 - a) * texel(x0, y0) + a * texel(x0 + 1, y0)) +
+                         b * ((1 - a) * texel(x0, y0 + 1) + a * texel(x0 + 1, y0 + 1));
+  return part.material_of.empty() ? color : Vector3f(color.cwiseProduct(part.materials[material].colors[0]));
 }
 
 Vector3f LitScene::object_radiance(const Ray& ray, const Hit& hit) const {
@@ -160,10 +171,11 @@ Vector3f LitScene::object_radiance(const Ray& ray, const Hit& hit) const {
     cos_v = normal.dot(view);
   }
   const Part& part = parts_[object_of_[hit.triangle]];
-  const Material& m = part.at(point);
+  const std::size_t material = part.material_index(point, hit.triangle);
+  const Material& m = part.materials[material];
   if (m.unlit) return m.colors[0];
   const float mirrored = mirror(m, cos_v);
-  Vector3f radiance = (1 - mirrored) * base_color(part, m, hit, point).cwiseProduct(light);
+  Vector3f radiance = (1 - mirrored) * base_color(part, material, hit, point).cwiseProduct(light);
   const Vector3f start = point + offset_ * normal;
   for (const Lamp& lamp : lamps_) {
     const Vector3f way = lamp.position - point;

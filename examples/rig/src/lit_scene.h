@@ -49,9 +49,12 @@ class LitScene {
     Eigen::Vector3f foot{0, 0, 0};
     float size = 1;
     std::vector<std::array<Eigen::Vector2f, 3>> uv;
-    Image texture;
+    std::vector<Image> textures;  ///< one a material, or one for all
+    std::vector<std::uint16_t> material_of;
+    std::uint32_t split = 1;  ///< into how many a triangle of the object was split
 
-    const Material& at(const Eigen::Vector3f& point) const;
+    /// Number of the material at a point on one of mesh_'s triangles.
+    std::size_t material_index(const Eigen::Vector3f& point, std::uint32_t triangle) const;
   };
 
   void add(const Object& object, float vertex_spacing);
@@ -71,7 +74,7 @@ class LitScene {
                              bool room_done) const;
   Eigen::Vector3f lamps_at(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, int rays,
                            std::uint64_t turn) const;
-  Eigen::Vector3f base_color(const Part& part, const Material& material, const hull::Hit& hit,
+  Eigen::Vector3f base_color(const Part& part, std::size_t material, const hull::Hit& hit,
                              const Eigen::Vector3f& point) const;
   /// What a mirror shows whose reflections turn by up to `blur` (sine): the ceiling's bright edge is softened, the only
   /// one with much contrast.

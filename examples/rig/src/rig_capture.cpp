@@ -40,7 +40,7 @@ struct Session {
 Object object_of(const RigOptions& o) {
   Object object = object_by_name(o.object, o.size_m);
   Material& m = object.material;
-  if (o.unlit || o.uniform) object.material_at = nullptr, object.others.clear();
+  if (o.unlit || o.uniform) object.material_at = nullptr, object.material_of.clear(), object.others.clear();
   if (o.matt) {
     m.reflectance = 0;
     for (Material& other : object.others) other.reflectance = 0;
