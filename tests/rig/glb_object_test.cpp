@@ -41,10 +41,9 @@ struct Tetrahedron {
                          accessor(3, 5123, 6, "SCALAR")};
     json["images"] = {{{"bufferView", 4}, {"mimeType", "image/png"}}};
     json["textures"] = {{{"source", 0}}};
-    json["materials"] = {
-        {{"pbrMetallicRoughness",
-          {{"baseColorFactor", {.8, .1, .05, 1}}, {"metallicFactor", 0}, {"roughnessFactor", .7}}}},
-        {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 1}}}}};
+    json["materials"] = {{{"pbrMetallicRoughness",
+                           {{"baseColorFactor", {.8, .1, .05, 1}}, {"metallicFactor", 0}, {"roughnessFactor", .7}}}},
+                         {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 1}}}}};
     json["meshes"] = {{{"primitives",
                         {{{"attributes", {{"POSITION", 0}}}, {"indices", 2}, {"material", 0}},
                          {{"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}}}, {"indices", 3}, {"material", 1}}}}}};
@@ -77,7 +76,7 @@ class GlbObject : public testing::Test {
     EXPECT_NE(std::string(e.what()).find("tetrahedron.glb"), std::string::npos) << e.what();
     return e.what();
   }
-  test::TempFolder folder_;
+  test::TemporaryFolder folder_;
   std::filesystem::path file_ = folder_.path() / "tetrahedron.glb";
 };
 
