@@ -25,10 +25,10 @@ int main(int argc, char** argv) {
   std::string output;
   rig::RigOptions options;
   unsigned threads = 0;
-  bool plain = false, fast = false, no_distortion = false, no_noise = false;
+  bool plain = false, fast = false, fine = false, no_distortion = false, no_noise = false;
   app.add_option("-o,--output", output, "folder to make; must be new or empty")->required();
   app.add_option("--object", options.object,
-                 "vase, bust, statue, gate, box, sphere, pebble, or a mesh file (.obj, .ply)")
+                 "vase, bust, statue, snowmobile, deer, gate, box, sphere, pebble, or a mesh file (.obj, .ply, .glb)")
       ->capture_default_str();
   app.add_option("--size", options.size_m, "longest side of the object, m")->capture_default_str();
   app.add_option("--photos", options.photos, "photographs of the object")->capture_default_str();
@@ -57,7 +57,11 @@ int main(int argc, char** argv) {
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, rig::PhotoFormat>{{"jpeg", rig::PhotoFormat::jpeg}, {"png", rig::PhotoFormat::png}}));
   app.add_option("--quality", options.jpeg_quality, "of the JPEGs, 1 to 100")->capture_default_str();
-  app.add_option("--rays", options.photo.rays, "n x n rays a pixel")->capture_default_str();
+  app.add_option("--f-number", options.photo.f_number, "of the lens' opening; 0: a pinhole, all is sharp")
+      ->capture_default_str();
+  app.add_option("--focus", options.photo.focus_m, "distance that is sharp, m; 0: the object's middle")
+      ->capture_default_str();
+  app.add_flag("--bayer", options.photo.bayer, "a sensor with one colour a pixel, demosaiced");
   app.add_option("--exposure", options.photo.exposure, "brightness")->capture_default_str();
   app.add_flag("--no-noise", no_noise, "an ideal sensor");
   app.add_option("--test-views", options.test_views,
@@ -67,6 +71,7 @@ int main(int argc, char** argv) {
   app.add_flag("--plain", plain,
                "plain files and P.txt (without targets) instead of a capture folder; implies --no-distortion");
   app.add_flag("--fast", fast, "trace a third of the size and enlarge; noise at full size");
+  app.add_flag("--fine", fine, "four times the rays and paths")->excludes("--fast");
   app.add_option("--threads", threads, "0: one for each core")->capture_default_str();
   try {
     app.parse(argc, argv);
@@ -74,7 +79,10 @@ int main(int argc, char** argv) {
     return app.exit(e) == 0 ? 0 : 2;
   }
   options.distortion = !no_distortion && !plain;
-  if (fast) options.photo.reduce = 3;
+  const rig::Quality quality = fast ? rig::Quality::fast : fine ? rig::Quality::fine : rig::Quality::normal;
+  const rig::PhotoOptions rays = rig::photo_options(quality);
+  options.photo.rays = rays.rays, options.photo.edge_rays = rays.edge_rays, options.photo.reduce = rays.reduce;
+  options.light = rig::light_options(quality);
   if (no_noise) options.photo.full_well = 0;
   if (unlit.size() == 3) options.unlit = {std::uint8_t(unlit[0]), std::uint8_t(unlit[1]), std::uint8_t(unlit[2])};
 

@@ -3,6 +3,10 @@
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <numeric>
+#include <set>
+#include <unordered_set>
+#include <vector>
 
 #include "support.h"
 
@@ -39,6 +43,46 @@ TEST(Shapes, AreClosedOrientedAndOfTheSizeAsked) {
     const auto [low, high] = bounding_box(object.mesh);
     EXPECT_NEAR((high - low).maxCoeff(), .6, 1e-5);
     EXPECT_NEAR(low.z(), 0, 1e-6);
+  }
+}
+
+TEST(Shapes, StandInsAreOnePieceOfTheTablesSize) {
+  struct Case {
+    Object object;
+    double width, depth, height;  ///< of the paper's table 1, m
+  };
+  for (const auto& [object, width, depth, height] :
+       {Case{make_snowmobile(2.8), 2.8, 1.0, 1.3}, Case{make_deer(1.0), .6, .8, 1.0}}) {
+    SCOPED_TRACE(object.name);
+    const auto [low, high] = bounding_box(object.mesh);
+    EXPECT_NEAR((high - low).x() / width, 1, .04);
+    EXPECT_NEAR((high - low).y() / depth, 1, .04);
+    EXPECT_NEAR((high - low).z() / height, 1, .04);
+    EXPECT_GT(object.mesh.triangles.size(), 100'000u);
+    EXPECT_LT(object.mesh.triangles.size(), 300'000u);
+    // Closed: each side of a triangle has one that goes the other way.
+    std::unordered_set<std::uint64_t> sides;
+    for (const auto& t : object.mesh.triangles)
+      for (std::size_t k = 0; k < 3; ++k) EXPECT_TRUE(sides.insert(std::uint64_t(t[k]) << 32 | t[(k + 1) % 3]).second);
+    for (const std::uint64_t side : sides) ASSERT_TRUE(sides.contains(side << 32 | side >> 32));
+    // In one piece: from any vertex to the first.
+    std::vector<std::uint32_t> parent(object.mesh.vertices.size());
+    std::iota(parent.begin(), parent.end(), 0u);
+    const auto root = [&](std::uint32_t v) {
+      while (parent[v] != v) v = parent[v] = parent[parent[v]];
+      return v;
+    };
+    for (const auto& t : object.mesh.triangles) parent[root(t[0])] = root(t[1]), parent[root(t[1])] = root(t[2]);
+    std::size_t pieces = 0;
+    for (std::uint32_t v = 0; v < parent.size(); ++v) pieces += parent[v] == v;
+    EXPECT_EQ(pieces, 1u);
+    // Its materials are all to be seen.
+    std::set<int> seen;
+    for (std::size_t i = 0; i < object.mesh.vertices.size(); i += 7)
+      seen.insert(object.material_at(object.mesh.vertices[i] / (high - low).maxCoeff()));
+    EXPECT_EQ(*seen.begin(), 0);
+    EXPECT_EQ(seen.size(), object.others.size() + 1);
+    EXPECT_EQ(*seen.rbegin(), int(object.others.size()));
   }
 }
 

@@ -39,7 +39,7 @@ Distances groups(const Vector3f& p) {
   ear = cut(ear, -leaf(q, {.105f, -.022f, .512f}, {.255f, .014f, .572f}, {0, -.55f, 1}, .036f, .022f), .01f);
   fur = blend(fur, ear, .02f);
   // Hair stands in tufts that hang down and back; longer on the neck.
-  const float length = .30f + .70f * (1 - smoothstep(.25f, .45f, q.z()));
+  const float length = (.30f + .70f * (1 - smoothstep(.25f, .45f, q.z()))) * smoothstep(-.33f, -.18f, q.y());
   if (std::fabs(fur) < .05f) {
     const Vector3f tuft(p.x() * 46, (p.y() + .5f * p.z()) * 30, (p.z() - .4f * p.y()) * 11);
     fur += length * (.016f * fractal_noise(tuft, 2, 31) + .006f * fractal_noise(tuft * 2.7f, 1, 33));

@@ -27,11 +27,13 @@ struct Mirror {
   int object = 0;
   std::vector<Material> materials;
   std::function<int(const Vector3f&)> material_at;
+  std::vector<std::uint16_t> material_of;
   Vector3f foot{0, 0, 0};
   ShadingMesh shape;
   double size = 1;  ///< longest side, m
 
-  const Material& at(const Vector3d& point) const {
+  const Material& at(const Vector3d& point, std::size_t triangle) const {
+    if (!material_of.empty()) return materials[std::size_t(material_of[triangle])];
     if (!material_at) return materials[0];
     const int k = material_at((point.cast<float>() - foot) / float(size));
     return materials[std::size_t(std::clamp(k, 0, int(materials.size()) - 1))];
@@ -40,6 +42,7 @@ struct Mirror {
 
 struct MirrorPoint {
   Vector3d point, normal;
+  std::size_t triangle = 0;
 };
 
 /// w = n x (v + l) for a point p with normal n, v and l the unit vectors to eye and lamp: zero where n halves the angle
@@ -125,7 +128,8 @@ struct HighlightFinder::Impl {
         w[i] = bisector(p, n);
     }
     std::vector<MirrorPoint> found;
-    for (const auto& t : mesh.triangles) {
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+      const auto& t = mesh.triangles[i];
       Vector3d p[3], n[3], at[3];
       bool seen = true;
       for (std::size_t k = 0; k < 3; ++k) {
@@ -137,8 +141,9 @@ struct HighlightFinder::Impl {
         p[k] = mesh.vertices[t[k]].cast<double>();
         n[k] = mirror.shape.normals[t[k]].cast<double>();
       }
-      const auto point = mirror_point(bisector, p, n, at);
+      auto point = mirror_point(bisector, p, n, at);
       if (!point) continue;
+      point->triangle = i;
       // The one on a border is found from both sides.
       const bool known = std::any_of(found.begin(), found.end(), [&](const MirrorPoint& other) {
         return (other.point - point->point).norm() < 1e-6 * mirror.size;
@@ -164,8 +169,8 @@ HighlightFinder::HighlightFinder(const Scene& scene) : impl_(new Impl{Room(scene
                      [](const Material& m) { return !m.unlit && m.reflectance > 0; }))
       continue;
     const auto [low, high] = bounding_box(object.mesh);
-    impl_->mirrors.push_back({int(i), std::move(materials), object.material_at, Vector3f(0, 0, low.z()),
-                              shading_mesh(object, std::numeric_limits<float>::infinity()),
+    impl_->mirrors.push_back({int(i), std::move(materials), object.material_at, object.material_of,
+                              Vector3f(0, 0, low.z()), shading_mesh(object, std::numeric_limits<float>::infinity()),
                               double((high - low).maxCoeff())});
   }
   if (!all.empty()) impl_->rays.emplace(all);
@@ -184,10 +189,10 @@ std::vector<Highlight> HighlightFinder::find(const View& view) const {
     const Vector3d shine = lamp.position.cast<double>();
     const std::size_t first = found.size();
     for (const Mirror& mirror : impl_->mirrors)
-      for (const auto& [point, normal] : impl_->mirror_points(mirror, {eye, shine})) {
+      for (const auto& [point, normal, triangle] : impl_->mirror_points(mirror, {eye, shine})) {
         const Vector3d to_eye = eye - point, to_lamp = shine - point;
         const double distance = to_lamp.norm();
-        const Material& material = mirror.at(point);
+        const Material& material = mirror.at(point, triangle);
         if (material.unlit) continue;
         const float gloss_here = gloss(material, normal.cast<float>(), (to_lamp / distance).cast<float>(),
                                        to_eye.normalized().cast<float>(), float(lamp.radius / distance));

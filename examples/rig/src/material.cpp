@@ -113,6 +113,12 @@ float gloss(const Material& m, const Vector3f& n, const Vector3f& l, const Vecto
   return distribution * masking * fresnel * nl;
 }
 
+float mean_mirror(const Material& m) {
+  if (m.reflectance <= 0) return 0;
+  // Of (1 - cos)^5, weighed with the cosine: 1 / 21.
+  return m.reflectance + (std::max(1 - m.roughness, m.reflectance) - m.reflectance) / 21;
+}
+
 float mirror(const Material& m, float cos_v) {
   if (m.reflectance <= 0) return 0;
   const float smooth = std::max(1 - m.roughness, m.reflectance);

@@ -232,6 +232,19 @@ void check(const PhotoOptions& o) {
 
 }  // namespace
 
+PhotoOptions photo_options(Quality quality) {
+  PhotoOptions options;
+  if (quality == Quality::fast) options.reduce = 3;
+  if (quality == Quality::fine) options.rays = 4, options.edge_rays = 12;
+  return options;
+}
+
+LightOptions light_options(Quality quality) {
+  LightOptions options;
+  if (quality == Quality::fine) options.ambient_rays = 256, options.lamp_rays = 48, options.floor_texels = 320;
+  return options;
+}
+
 struct Photographer::Impl {
   LitScene scene;
 };

@@ -40,7 +40,7 @@ struct Session {
 Object object_of(const RigOptions& o) {
   Object object = object_by_name(o.object, o.size_m);
   Material& m = object.material;
-  if (o.unlit || o.uniform) object.material_at = nullptr, object.others.clear();
+  if (o.unlit || o.uniform) object.material_at = nullptr, object.material_of.clear(), object.others.clear();
   if (o.matt) {
     m.reflectance = 0;
     for (Material& other : object.others) other.reflectance = 0;
@@ -131,8 +131,9 @@ std::vector<std::string> take(const Photographer& photographer, const Camera& ca
           files[i] = shots.names[i] + ".jpg";
           ExifTags tags;
           tags.time = clock(i);
-          tags.focal_length_mm = kFocalLength_mm;
-          tags.sensor_width_mm = kSensorWidth_mm;
+          tags.focal_length_mm = camera.f * o.photo.sensor_width_mm / camera.width;
+          tags.sensor_width_mm = o.photo.sensor_width_mm;
+          if (o.photo.f_number > 0) tags.f_number = o.photo.f_number;
           tags.width = camera.width;
           tags.height = camera.height;
           write_file(folder / files[i], with_exif(encode_jpeg(photo.picture, o.jpeg_quality), tags));

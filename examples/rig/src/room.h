@@ -27,6 +27,9 @@ class Room {
   int surfaces() const { return kPanels + enclosure_.panels; }
   bool contains(const Eigen::Vector3f& point) const;
 
+  /// A point that is inside, moved by as little as `margin` (m) asks for if it is not.
+  Eigen::Vector3f moved_inside(Eigen::Vector3f point, float margin) const;
+
   /// From a point inside; direction of any length.
   RoomHit hit(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
   /// How much of a look around `direction` (unit length) sees the ceiling, from 0 to 1: it fades from -blur to blur,
@@ -39,8 +42,8 @@ class Room {
 
   /// The paint's linear reflectance at a place: shades of panels, clouds, brush grain, seams.
   Eigen::Vector3f paint(const RoomHit& at) const;
-  /// How much less of the room's diffuse light reaches a place near an edge where two surfaces meet, 0.55 … 1.
-  float edge_shade(const RoomHit& at) const;
+  /// The same without its variation within a surface: what counts for light that bounces.
+  Eigen::Vector3f mean_paint(int surface) const;
   /// Normal of panel i, towards the axis.
   const Eigen::Vector3f& panel_normal(int i) const { return normals_[std::size_t(i)]; }
 

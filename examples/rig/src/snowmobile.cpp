@@ -58,7 +58,7 @@ Distances groups(const Vector3f& p) {
   track = cut(track, -std::fmax(loop(p, .055f), .055f - q.y()), .01f);
   for (const auto& [x, z, r] :
        {std::array{.345f, .165f, .085f}, std::array{.75f, .135f, .07f}, std::array{1.17f, .175f, .10f}})
-    track = std::fmin(track, std::fmax(std::hypot(p.x() - x, p.z() - z) - r, std::fabs(q.y() - .11f) - .045f));
+    track = std::fmin(track, std::fmax(std::hypot(p.x() - x, p.z() - z) - r, std::fabs(q.y() - .10f) - .060f));
   d[kRubber] = track;
 
   // The windscreen: a bent shell that leans back, thinner than it looks.
@@ -87,7 +87,7 @@ Distances groups(const Vector3f& p) {
   metal = std::fmin(metal, capsule(q, {1.36f, .16f, .55f}, {1.22f, .19f, .47f}, .024f, .024f));
   d[kMetal] = std::fmin(metal, skis);
 
-  d[kGlass] = std::fmin(ellipsoid(q, {-1.07f, .125f, .505f}, {.11f, .075f, .045f}),
+  d[kGlass] = std::fmin(ellipsoid(q, {-1.10f, .130f, .525f}, {.11f, .075f, .050f}),
                         rounded_box(q, {1.155f, 0, .72f}, {.05f, .09f, .035f}, .02f));
   return d;
 }

@@ -46,6 +46,8 @@ struct Object {
   /// Further materials, and which a place has: 0 is `material`, k is others[k - 1]. The place is in units of the
   /// longest side, from the middle of the foot, as patterns see it. Empty: `material` all over.
   std::vector<Material> others;
+  std::vector<std::uint16_t> material_of;  ///< the same by triangle, for meshes from files; or empty
+  std::vector<Image> textures;             ///< with material_of: one a material, as `texture`; colors[0] is a factor
   std::function<int(const Eigen::Vector3f& place)> material_at;
   float stand = 0;  ///< radius of the pedestal that suits it, m; 0: a quarter wider than the object
 };
@@ -73,10 +75,10 @@ Object make_pebble(double size, int subdivisions = 6);
 /// inside. The long axis goes from x = -1/2 to 1/2, the foot is the origin. gradient (outwards) if wanted.
 double pebble_function(const Eigen::Vector3d& p, Eigen::Vector3d* gradient = nullptr);
 
-/// Reads a mesh (PLY, OBJ), makes it stand on z = 0 (`y_up`: the file's y axis is up) and scales it to `size` metres.
-/// An OBJ file's texture coordinates are read where a `texture` picture is given.
-/// Errors: those of hull::read_mesh and read_image; bad_input naming file and line where texture coordinates are
-/// missing, not finite or indices are out of range.
+/// Reads a mesh (PLY, OBJ, GLB with its materials), makes it stand on z = 0 (`y_up`: the file's y axis is up) and
+/// scales it to `size` metres. An OBJ file's texture coordinates are read where a `texture` picture is given. Errors:
+/// those of hull::read_mesh and read_image; bad_input naming file and line where texture coordinates are missing, not
+/// finite or indices are out of range.
 Object read_object(const std::filesystem::path& mesh, const std::filesystem::path& texture, double size, bool y_up);
 
 /// By name ("vase", "bust", "statue", "snowmobile", "deer", "gate", "box", "sphere", "pebble") or a mesh file (y up for

@@ -15,8 +15,9 @@ namespace lumihull::rig {
 
 /// How finely the light that does not depend on the camera is computed, once a scene.
 struct LightOptions {
-  int ambient_rays = 64;   ///< a vertex or texel
-  int lamp_rays = 12;      ///< a vertex or texel, for each lamp
+  int ambient_rays = 64;  ///< paths a vertex or texel
+  int lamp_rays = 12;     ///< a vertex or texel, for each lamp
+  int bounces = 8;  ///< along a path, 1 … 1000; it ends earlier where less than 1 % of its light would come back
   int floor_texels = 160;  ///< along a side of the floor's light map; walls have a fifth of it
   float vertex_spacing =
       .01f;  ///< triangles are split until their edges are shorter than this part of the object's size
@@ -46,6 +47,12 @@ struct PhotoOptions {
   std::vector<ThinLine> lines;                ///< objects hide them; masks don't know of them
   int reduce = 1;  ///< > 1: light is traced at 1/reduce of the size and enlarged bicubically; noise at full size
 };
+
+/// Time against quality, for those who want to say it in one word. fast: a third of the size is traced. normal: what the
+/// options' defaults are. fine: 4 times the rays and paths, finer light maps.
+enum class Quality : std::uint8_t { fast, normal, fine };
+PhotoOptions photo_options(Quality quality);
+LightOptions light_options(Quality quality);
 
 /// A photograph and the truth about it.
 struct Photo {
