@@ -31,7 +31,7 @@ void run(Program& program, Arguments& a) {
   if (a.ideal_lens) o.distortion = 0;
   o.sheets = !a.no_sheets, o.cables = !a.no_cables;
   rig::RobotErrors& e = o.errors;
-  for (double* size : {&e.departure_m, &e.attachment_m, &e.offset_m, &e.gain, &e.winch_m, &e.mount_m, &e.mount_rad,
+  for (double* size : {&e.departure_m, &e.attachment_m, &e.offset_m, &e.gain, &e.winch_m, &e.common_m, &e.mount_m, &e.mount_rad,
                        &e.bearing_rad, &e.table_m, &e.table_rad, &e.hand_m, &e.hand_rad, &e.swing_m, &e.swing_rad})
     *size *= a.robot_errors;
   if (a.no_swing) e.swing_m = e.swing_rad = 0;

@@ -26,7 +26,7 @@ SimulateOptions small() {
   o.object = "box";
   o.size_m = .3;
   o.photos = 9;
-  o.width = 720;
+  o.width = 900;
   o.circle_px = 7;
   o.empty_photos = 2, o.lens_photos = 2;
   o.light = test::coarse_light();
@@ -110,7 +110,7 @@ TEST(Simulate, MakesACaptureThatCalibrates) {
   // A quarter of the paper's pixels a side, nine photographs, circles of 7 px at most.
   EXPECT_LT(agreement.position_rms_m, .0015);
   EXPECT_LT(agreement.rotation_rms_rad, .001);
-  EXPECT_NEAR(capture.cameras[0].f, sensor_camera(720, 18).f, .003 * capture.cameras[0].f);
+  EXPECT_NEAR(capture.cameras[0].f, sensor_camera(900, 18).f, .003 * capture.cameras[0].f);
 
   // The same command again has nothing to do; with other options it is refused.
   EXPECT_EQ(simulate(folder / "c", small(), job).taken, 0u);
@@ -158,10 +158,10 @@ TEST(Simulate, GoesOnAfterAKillWithTheSamePhotographs) {
   }
   for (const char* file : {"sheets.json", "truth/cameras.json", "truth/targets.json", "lens/board_0001.jpg",
                            "enclosure/empty_0001.jpg"})
-    EXPECT_EQ(read_file(folder / "whole" / file), read_file(folder / "killed" / file)) << file;
+    EXPECT_EQ(sha256_of_file(folder / "whole" / file), sha256_of_file(folder / "killed" / file)) << file;
   for (const Shot& shot : whole.shots) {
     const std::string mask = "truth/masks/" + shot.name + ".png";
-    EXPECT_EQ(read_file(folder / "whole" / mask), read_file(folder / "killed" / mask)) << shot.name;
+    EXPECT_EQ(sha256_of_file(folder / "whole" / mask), sha256_of_file(folder / "killed" / mask)) << shot.name;
   }
 }
 
@@ -175,7 +175,7 @@ TEST(Simulate, EveryViewOfThePlanDecodesFiveTargets) {
     const TargetSights sights(session.scene);
     const RigRobot robot(session.plan, {session.errors, {}, false});
     RoomTargets before = scatter_targets(session.scene, session.lens.camera, session.radius_m,
-                                         {.circle_px = 9, .spacing = 1 / std::sqrt(density), .seed = 1});
+                                         {.circle_px = 9, .density = density, .seed = 1});
     int photographs = 0, poor_before = 0;
     for (const capture::PlannedStop& stop : session.plan.stops) {
       if (!stop.photograph) continue;
