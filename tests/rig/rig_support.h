@@ -33,7 +33,6 @@ inline rig::Scene in_the_dark(rig::Object object, double roughness) {
   object.material.roughness = float(roughness);
   rig::Scene scene = rig::make_scene(std::move(object), {0, 0, 0}, false, 1);
   scene.enclosure.ceiling = {0, 0, 0};
-  scene.ambient = {0, 0, 0};
   scene.lamps.resize(1);
   scene.lamps[0].radius = .02f;
   scene.lamps[0].intensity *= .1f;

@@ -78,6 +78,16 @@ Vector3f pattern_color(const Material& m, const Vector3f& q) {
       color = lerp(color, m.colors[2], smoothstep(.12f, .18f, spot));
       break;
     }
+    case Pattern::fur: {
+      // Hairs hang down and back: noise that is stretched that way, finer across it.
+      const Vector3f along(q.x() * 130, (q.y() + .5f * q.z()) * 70, (q.z() - .4f * q.y()) * 22);
+      const float hair = fractal_noise(along, 3, 21), tuft = fractal_noise(q * 14, 3, 22);
+      const float below = smoothstep(.0f, .14f, -q.y() - .9f * (q.z() - .30f) + .05f * tuft);
+      const float above = smoothstep(.0f, .10f, q.z() - .52f + .25f * q.y() + .05f * tuft);
+      color = lerp(lerp(m.colors[0], m.colors[1], .75f * below), m.colors[2], .7f * above);
+      color *= std::clamp(1 + .9f * hair + .35f * tuft, .35f, 1.9f);
+      break;
+    }
     case Pattern::pottery:
       color = pottery(m, q);
       break;
@@ -101,6 +111,12 @@ float gloss(const Material& m, const Vector3f& n, const Vector3f& l, const Vecto
       .5f / (nl * std::sqrt(nv * nv * (1 - k2) + k2) + nv * std::sqrt(nl * nl * (1 - k2) + k2));  // G / (4 nl nv)
   const float fresnel = m.reflectance + (1 - m.reflectance) * std::pow(1 - vh, 5.f);
   return distribution * masking * fresnel * nl;
+}
+
+float mean_mirror(const Material& m) {
+  if (m.reflectance <= 0) return 0;
+  // Of (1 - cos)^5, weighed with the cosine: 1 / 21.
+  return m.reflectance + (std::max(1 - m.roughness, m.reflectance) - m.reflectance) / 21;
 }
 
 float mirror(const Material& m, float cos_v) {

@@ -14,6 +14,9 @@ Eigen::Vector3f pattern_color(const Material& material, const Eigen::Vector3f& q
 float gloss(const Material& material, const Eigen::Vector3f& n, const Eigen::Vector3f& l, const Eigen::Vector3f& v,
             float spread);
 
+/// The mean of mirror() over a hemisphere of diffuse light: what the diffuse part lacks.
+float mean_mirror(const Material& material);
+
 /// Mirror reflectance of the surroundings at the angle with cosine `cos_v` (Schlick, dimmed by roughness).
 float mirror(const Material& material, float cos_v);
 

@@ -120,25 +120,18 @@ Vector3f Room::paint(const RoomHit& at) const {
     const Vector3f& n = at.normal;
     const float across = std::fabs(-n.y() * at.point.x() + n.x() * at.point.y());
     const float half = e.radius * std::tan(3.1415927f / float(e.panels));
-    shade *= 1 - .55f * (1 - smoothstep(.001f, .004f, (half - across) / e.radius));
-    shade *= 1 - .12f * (1 - smoothstep(0.f, .10f, q.z()));
+    const float worn = std::min(1.f, e.unevenness / .22f);
+    shade *= 1 - .55f * worn * (1 - smoothstep(.001f, .004f, (half - across) / e.radius));
+    shade *= 1 - .12f * worn * (1 - smoothstep(0.f, .10f, q.z()));
   }
   // Thin paint lets a little more yellow through.
   const Vector3f hue(1 + .25f * clouds * e.unevenness / .22f, 1.f, 1 - .12f * clouds * e.unevenness / .22f);
   return (e.color.cwiseProduct(shades_[std::size_t(at.surface)]).cwiseProduct(hue) * shade).cwiseMax(0.f).cwiseMin(1.f);
 }
 
-float Room::edge_shade(const RoomHit& at) const {
-  const Enclosure& e = enclosure_;
-  const auto corner = [&](float distance) { return 1 - .45f * std::exp(-distance / (.10f * e.radius)); };
-  float shade = 1;
-  if (at.surface == kFloor) {
-    for (const Vector3f& n : normals_) shade *= corner(e.radius + n.dot(at.point));
-    if (e.pedestal_height > 0) shade *= corner(2 * std::max(0.f, at.point.head<2>().norm() - e.pedestal_radius));
-  } else if (at.surface >= kPanels || at.surface == kPedestalSide) {
-    shade *= corner(at.point.z());
-  }
-  return shade;
+Vector3f Room::mean_paint(int surface) const {
+  if (surface == kCeiling) return Vector3f::Zero();
+  return enclosure_.color.cwiseProduct(shades_[std::size_t(surface)]).cwiseMax(0.f).cwiseMin(1.f);
 }
 
 }  // namespace lumihull::rig

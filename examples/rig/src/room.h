@@ -39,8 +39,8 @@ class Room {
 
   /// The paint's linear reflectance at a place: shades of panels, clouds, brush grain, seams.
   Eigen::Vector3f paint(const RoomHit& at) const;
-  /// How much less of the room's diffuse light reaches a place near an edge where two surfaces meet, 0.55 … 1.
-  float edge_shade(const RoomHit& at) const;
+  /// The same without its variation within a surface: what counts for light that bounces.
+  Eigen::Vector3f mean_paint(int surface) const;
   /// Normal of panel i, towards the axis.
   const Eigen::Vector3f& panel_normal(int i) const { return normals_[std::size_t(i)]; }
 

@@ -60,8 +60,6 @@ Scene make_scene(Object object, const Vector3f& paint, bool pedestal, std::uint6
   lamp(-1.05f, 7.5f, 7.2f, .70f, .76f, {1.f, .96f, .90f});
   lamp(-2.60f, 7.6f, 6.6f, 1.1f, .36f, {.92f, .97f, 1.f});
   lamp(1.15f, 7.0f, 7.8f, .80f, .46f, {1.f, .98f, .95f});
-  // What bounces between painted walls takes on some of their colour.
-  scene.ambient = Vector3f::Constant(.15f) + .30f * paint;
   return scene;
 }
 

@@ -15,8 +15,9 @@ namespace lumihull::rig {
 
 /// How finely the light that does not depend on the camera is computed, once a scene.
 struct LightOptions {
-  int ambient_rays = 64;   ///< a vertex or texel
-  int lamp_rays = 12;      ///< a vertex or texel, for each lamp
+  int ambient_rays = 64;  ///< paths a vertex or texel
+  int lamp_rays = 12;     ///< a vertex or texel, for each lamp
+  int bounces = 8;  ///< along a path, 1 … 1000; it ends earlier where less than 1 % of its light would come back
   int floor_texels = 160;  ///< along a side of the floor's light map; walls have a fifth of it
   float vertex_spacing =
       .01f;  ///< triangles are split until their edges are shorter than this part of the object's size

@@ -19,12 +19,13 @@ struct Lamp {
 /// The room around the object: a prism of painted panels (paper, section 3.2: "many shades of green"), a painted floor,
 /// and a white ceiling that glows and that no photograph should see.
 struct Enclosure {
-  int panels = 8;                                  ///< >= 3
-  float radius = 3;                                ///< m, axis to panel
-  float height = 3.3f;                             ///< m
-  Eigen::Vector3f color{.030f, .20f, .042f};       ///< mean paint, linear
-  float unevenness = .22f;                         ///< spread of shade among panels and within one, 0 … 1
-  Eigen::Vector3f ceiling{1.f, .99f, .96f};        ///< radiance
+  int panels = 8;                             ///< >= 3
+  float radius = 3;                           ///< m, axis to panel
+  float height = 3.3f;                        ///< m
+  Eigen::Vector3f color{.030f, .20f, .042f};  ///< mean paint, linear
+  float unevenness = .22f;                    ///< spread of shade among panels and within one, 0 … 1; 0: no seams
+  Eigen::Vector3f ceiling{1.f, .99f, .96f};   ///< radiance
+  Eigen::Vector3f glow{0, 0, 0};              ///< radiance of panels, floor and pedestal themselves: a light tent
   float pedestal_radius = 0, pedestal_height = 0;  ///< m; 0: none. Round, painted like the rest
   std::uint64_t seed = 1;                          ///< of the paint
 };
@@ -39,7 +40,6 @@ struct Scene {
   std::vector<Lamp> lamps;
   /// Printed sheets that lie on walls and floor, lit as the paint there; objects and the pedestal stand before them.
   std::vector<FlatPrint> sheets;
-  Eigen::Vector3f ambient{.20f, .24f, .20f};  ///< light that paint receives from everywhere (many bounces)
 
   /// Centre and radius of a ball around all objects; (0,0,0) and 0 without objects.
   Eigen::Vector3f center() const;
