@@ -25,7 +25,8 @@ SimulateOptions small() {
   SimulateOptions o;
   o.object = "box";
   o.size_m = .3;
-  o.photos = 9;
+  o.photos = 10;
+  o.density = .25;
   o.width = 900;
   o.circle_px = 7;
   o.empty_photos = 2, o.lens_photos = 2;
@@ -74,13 +75,13 @@ TEST(Simulate, MakesACaptureThatCalibrates) {
   const test::TemporaryFolder folder;
   Job job;
   const Simulated made = simulate(folder / "c", small(), job);
-  EXPECT_EQ(made.photographs, 9u);
-  EXPECT_EQ(made.taken, 9u);
+  EXPECT_EQ(made.photographs, 10u);
+  EXPECT_EQ(made.taken, 10u);
   EXPECT_EQ(made.carrier, "cables");
   EXPECT_GE(made.least_targets, 5);
 
   Capture capture = Capture::open(folder / "c");
-  ASSERT_EQ(capture.shots.size(), 9u);
+  ASSERT_EQ(capture.shots.size(), 10u);
   EXPECT_EQ(capture.enclosure.size(), 2u);
   EXPECT_EQ(capture.unit, Unit::unknown);
   const auto truth = truth_of(folder / "c", capture);
@@ -154,7 +155,8 @@ TEST(Simulate, GoesOnAfterAKillWithTheSamePhotographs) {
   ASSERT_EQ(again.shots.size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_EQ(whole.shots[i].name, again.shots[i].name);
-    EXPECT_EQ(whole.shots[i].stamp.sha256, again.shots[i].stamp.sha256) << whole.shots[i].name;
+    // The clock went on while it was killed: the same pixels, another time.
+    EXPECT_TRUE(test::same_bytes(whole.read_photo(i), again.read_photo(i))) << whole.shots[i].name;
   }
   for (const char* file : {"sheets.json", "truth/cameras.json", "truth/targets.json", "lens/board_0001.jpg",
                            "enclosure/empty_0001.jpg"})
