@@ -59,7 +59,7 @@ void add_simulate(Program& program) {
   CLI::App* verb = program.verb("simulate", "photograph an object with the virtual rig, through a plan and a session",
                                 [&program, a] { run(program, *a); });
   verb->add_option("folder", a->folder, "of the capture, new or begun by the same command")->required();
-  verb->add_option("--object", o.object, "vase, bust, statue, gate, box, sphere, pebble, or a mesh file [bust]");
+  verb->add_option("--object", o.object, "vase, bust, statue, gate, snowmobile, deer, box, sphere, pebble, or a mesh file [bust]");
   verb->add_option("--size", o.size_m, "longest side of the object, m [as in the paper, or 0.6]");
   verb->add_flag("--matt", o.matt, "the object has no gloss");
   verb->add_flag("--uniform", o.uniform, "the object has one paint all over");

@@ -26,7 +26,6 @@ SimulateOptions small() {
   o.object = "box";
   o.size_m = .3;
   o.photos = 10;
-  o.density = .25;
   o.width = 900;
   o.circle_px = 7;
   o.empty_photos = 2, o.lens_photos = 2;

@@ -74,7 +74,7 @@ TEST_F(ThinLines, CoverWhatTheirOutlineDoes) {
 TEST_F(ThinLines, FollowTheLens) {
   const Covered straight = draw({-.2, -.14, .6}, {.2, -.14, .6}, .001);
   view_.camera = sensor_camera(600, 18, kSensorWidth_mm, 1);
-  const Covered bent = draw({-.2, -.14, .6}, {.2, -.14, .6}, .001);
+  const Covered bent = draw({-.2, -.14, .6}, {.2, -.14, .6}, .0025);
   for (const double wanted : {60.5, 150.5, 300.5, 520.5}) {
     // The line's point in the middle of a column.
     double low = -.2, high = .2;
@@ -82,12 +82,13 @@ TEST_F(ThinLines, FollowTheLens) {
       (view_.camera.project({(low + high) / 2, -.14, .6})->x() < wanted ? low : high) = (low + high) / 2;
     const auto px = view_.camera.project({low, -.14, .6});
     ASSERT_TRUE(px);
-    // Both borders, from how much of the column is covered above and below the middle.
+    // Both borders, from how much of the column is covered above and below a row that is wholly covered.
     const int middle = int(px->y());
     double above = 0, below = 0;
     for (int y = 0; y < view_.camera.height; ++y)
       (y < middle ? above : below) += double(bent.part.row<float>(y)[int(px->x())]);
     ASSERT_GT(above + below, .5);
+    EXPECT_GT(bent.part.row<float>(middle)[int(px->x())], .999);
     EXPECT_NEAR(middle + .5 * (below - above), px->y(), .01);
   }
   EXPECT_GT(straight.sum, 100);
