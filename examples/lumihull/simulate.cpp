@@ -31,7 +31,7 @@ void run(Program& program, Arguments& a) {
   if (a.ideal_lens) o.distortion = 0;
   o.sheets = !a.no_sheets, o.cables = !a.no_cables;
   rig::RobotErrors& e = o.errors;
-  for (double* size : {&e.departure_m, &e.attachment_m, &e.offset_m, &e.gain, &e.winch_m, &e.mount_m, &e.mount_rad,
+  for (double* size : {&e.departure_m, &e.attachment_m, &e.offset_m, &e.gain, &e.winch_m, &e.common_m, &e.mount_m, &e.mount_rad,
                        &e.bearing_rad, &e.table_m, &e.table_rad, &e.hand_m, &e.hand_rad, &e.swing_m, &e.swing_rad})
     *size *= a.robot_errors;
   if (a.no_swing) e.swing_m = e.swing_rad = 0;
@@ -59,7 +59,7 @@ void add_simulate(Program& program) {
   CLI::App* verb = program.verb("simulate", "photograph an object with the virtual rig, through a plan and a session",
                                 [&program, a] { run(program, *a); });
   verb->add_option("folder", a->folder, "of the capture, new or begun by the same command")->required();
-  verb->add_option("--object", o.object, "vase, bust, statue, gate, box, sphere, pebble, or a mesh file [bust]");
+  verb->add_option("--object", o.object, "vase, bust, statue, gate, snowmobile, deer, box, sphere, pebble, or a mesh file [bust]");
   verb->add_option("--size", o.size_m, "longest side of the object, m [as in the paper, or 0.6]");
   verb->add_flag("--matt", o.matt, "the object has no gloss");
   verb->add_flag("--uniform", o.uniform, "the object has one paint all over");

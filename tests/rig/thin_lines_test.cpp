@@ -47,7 +47,10 @@ TEST_F(ThinLines, CoverWhatTheirOutlineDoes) {
   const double f = view_.camera.f;
   // Across the sight above the object, .6 m away: a strip of constant width.
   const Covered flat = draw({-.1, -.14, .6}, {.12, -.12, .6}, .0008);
-  const double length = std::hypot(.22, .02) * f / .6, width = 2 * .0008 * f / .6;
+  // A cylinder's outline touches it where the line of sight does, which off the axis is not where it is widest across
+  // the axis: wider by the angle at which the eye's plane through the line stands off the axis.
+  const double away = .13 / std::hypot(.6, .13);
+  const double length = std::hypot(.22, .02) * f / .6, width = 2 * .0008 * f / .6 / std::sqrt(1 - away * away);
   EXPECT_NEAR(flat.sum, length * width, 2e-3 * length * width);
   // Each pixel by itself: a strip's coverage from signed distances to its middle, by 40 x 40 points.
   const Eigen::Vector2d a(f * -.1 / .6 + view_.camera.u0, f * -.14 / .6 + view_.camera.v0),
@@ -60,11 +63,10 @@ TEST_F(ThinLines, CoverWhatTheirOutlineDoes) {
         in += std::fabs(across.dot(Eigen::Vector2d(x + (i % 40 + .5) / 40, y + (i / 40 + .5) / 40) - a)) < width / 2;
       EXPECT_NEAR(flat.part.row<float>(y)[x], in / 1600., .02) << x << ", " << y;
     }
-  // Along the depth it tapers: the mean of the width is that of 1 / z.
-  const Covered deep = draw({-.2, -.14, .5}, {.2, -.30, 1.1}, .001);
-  const Eigen::Vector2d c(f * -.2 / .5, f * -.14 / .5), d(f * .2 / 1.1, f * -.30 / 1.1);
-  const double mean = .001 * f * (1 / .5 + 1 / 1.1);
-  EXPECT_NEAR(deep.sum, (d - c).norm() * mean, .03 * deep.sum);
+  // Along the depth it tapers: in the plane of the optical axis the mean of the width is that of 1 / z.
+  const Covered deep = draw({0, -.14, .5}, {0, -.30, 1.3}, .001);
+  const double mean = .001 * f * (1 / .5 + 1 / 1.3);
+  EXPECT_NEAR(deep.sum, f * (.14 / .5 - .30 / 1.3) * mean, 3e-3 * deep.sum);
   // Blur spreads, it does not add.
   EXPECT_NEAR(draw({-.1, -.14, .6}, {.12, -.12, .6}, .0008, 1.5).sum, flat.sum, 2e-3 * flat.sum);
 }
@@ -72,17 +74,22 @@ TEST_F(ThinLines, CoverWhatTheirOutlineDoes) {
 TEST_F(ThinLines, FollowTheLens) {
   const Covered straight = draw({-.2, -.14, .6}, {.2, -.14, .6}, .001);
   view_.camera = sensor_camera(600, 18, kSensorWidth_mm, 1);
-  const Covered bent = draw({-.2, -.14, .6}, {.2, -.14, .6}, .001);
-  for (const double x : {-.15, 0., .15}) {
-    const auto px = view_.camera.project({x, -.14, .6});
+  const Covered bent = draw({-.2, -.14, .6}, {.2, -.14, .6}, .0025);
+  for (const double wanted : {60.5, 150.5, 300.5, 520.5}) {
+    // The line's point in the middle of a column.
+    double low = -.2, high = .2;
+    for (int i = 0; i < 60; ++i)
+      (view_.camera.project({(low + high) / 2, -.14, .6})->x() < wanted ? low : high) = (low + high) / 2;
+    const auto px = view_.camera.project({low, -.14, .6});
     ASSERT_TRUE(px);
-    double sum = 0, moment = 0;
-    for (int y = 0; y < view_.camera.height; ++y) {
-      const double part = bent.part.row<float>(y)[int(px->x())];
-      sum += part, moment += part * (y + .5);
-    }
-    ASSERT_GT(sum, .5);
-    EXPECT_NEAR(moment / sum, px->y(), .03);
+    // Both borders, from how much of the column is covered above and below a row that is wholly covered.
+    const int middle = int(px->y());
+    double above = 0, below = 0;
+    for (int y = 0; y < view_.camera.height; ++y)
+      (y < middle ? above : below) += double(bent.part.row<float>(y)[int(px->x())]);
+    ASSERT_GT(above + below, .5);
+    EXPECT_GT(bent.part.row<float>(middle)[int(px->x())], .999);
+    EXPECT_NEAR(middle + .5 * (below - above), px->y(), .01);
   }
   EXPECT_GT(straight.sum, 100);
 }

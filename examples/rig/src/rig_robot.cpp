@@ -57,7 +57,7 @@ std::uint64_t thing(Thing kind, std::uint64_t which) { return mix(std::uint64_t(
 
 RobotErrors RobotErrors::none() {
   RobotErrors e;
-  e.departure_m = e.attachment_m = e.offset_m = e.gain = e.winch_m = 0;
+  e.departure_m = e.attachment_m = e.offset_m = e.gain = e.winch_m = e.common_m = 0;
   e.mount_m = e.mount_rad = e.bearing_rad = 0;
   e.table_m = e.table_rad = e.hand_m = e.hand_rad = 0;
   e.swing_m = e.swing_rad = 0;
@@ -67,7 +67,7 @@ RobotErrors RobotErrors::none() {
 RigRobot::RigRobot(const capture::Plan& plan, const Options& options)
     : kind_(plan.robot), mechanism_(plan.mechanism), options_(options), woke_(std::chrono::steady_clock::now()) {
   const RobotErrors& e = options_.errors;
-  for (const double x : {e.departure_m, e.attachment_m, e.offset_m, e.gain, e.winch_m, e.mount_m, e.mount_rad,
+  for (const double x : {e.departure_m, e.attachment_m, e.offset_m, e.gain, e.winch_m, e.common_m, e.mount_m, e.mount_rad,
                          e.bearing_rad, e.table_m, e.table_rad, e.hand_m, e.hand_rad, e.swing_m, e.swing_rad})
     if (!(x >= 0 && x <= 1)) throw Error(ErrorCode::invalid_argument, "expected errors from 0 to 1", "robot");
   if (!(e.swing_period_s > 0 && e.swing_decay_s > 0) || !std::isfinite(e.swing_period_s + e.swing_decay_s))
@@ -90,32 +90,45 @@ capture::Robot::State RigRobot::state() {
   return {.ready = true, .moving = false, .position_known = true, .lengths_m = memory_.lengths_m, .fault = {}};
 }
 
+std::uint64_t RigRobot::place_of(const PlannedStop& stop) const {
+  if (!mechanism_) return hash_of(stop.name);
+  std::uint64_t place = 1;
+  for (const double length : stop.lengths_m) place = mix(place, std::uint64_t(std::llround(length * 1e6)));
+  return place;
+}
+
 /// Where the platform comes to rest; without a mechanism where the camera is.
 Pose RigRobot::rest_of(const PlannedStop& stop, int visit) const {
   const RobotErrors& e = options_.errors;
-  Draws draws(e.seed, mix(thing(kArrival, hash_of(stop.name)), std::uint64_t(visit)));
+  Draws draws(e.seed, mix(thing(kArrival, place_of(stop)), std::uint64_t(visit)));
   if (!mechanism_) {
     const bool table = kind_ == "turntable";
     const Vector3d shift = (table ? e.table_m : e.hand_m) * draws.vector();
     return stop.cam_from_world.inverse() * small_motion(shift, (table ? e.table_rad : e.hand_rad) * draws.vector());
   }
   std::vector<double> lengths = stop.lengths_m;
+  const double common = e.common_m * draws.gauss();
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     Draws winch(e.seed, thing(kWinch, i));
     const double offset = e.offset_m * winch.gauss(), gain = e.gain * winch.gauss();
-    lengths[i] += offset + gain * lengths[i] + e.winch_m * draws.gauss();
+    lengths[i] += offset + gain * lengths[i] + common + e.winch_m * draws.gauss();
   }
   return capture::hang_rigid(*true_mechanism_, lengths, stop.world_from_platform).world_from_platform;
 }
 
 void RigRobot::arrive(const PlannedStop& stop, double swing) {
-  memory_.visit = stop.photograph ? ++memory_.visits[stop.name] : 1;
+  const std::uint64_t place = place_of(stop);
+  const bool moved = memory_.visit == 0 || place != memory_.place;
   memory_.stop = stop.name;
-  memory_.lengths_m = stop.lengths_m;
-  memory_.commanded = mechanism_ ? stop.world_from_platform : stop.cam_from_world;
-  memory_.arrived_s = memory_.still_s = memory_.clock_s;
-  memory_.swing = swing;
-  rest_ = rest_of(stop, memory_.visit);
+  if (moved) {
+    memory_.place = place;
+    memory_.visit = ++memory_.visits[place];
+    memory_.lengths_m = stop.lengths_m;
+    memory_.commanded = mechanism_ ? stop.world_from_platform : stop.cam_from_world;
+    memory_.arrived_s = memory_.still_s = memory_.clock_s;
+    memory_.swing = swing;
+    rest_ = rest_of(stop, memory_.visit);
+  }
   remember();
 }
 
@@ -162,7 +175,7 @@ Pose RigRobot::platform_at(double time_s) const {
   const RobotErrors& e = options_.errors;
   const double since = time_s - memory_.arrived_s;
   if (!mechanism_ || memory_.swing <= 0 || since < 0) return rest_;
-  Draws draws(e.seed, mix(thing(kSwing, hash_of(memory_.stop)), std::uint64_t(memory_.visit)));
+  Draws draws(e.seed, mix(thing(kSwing, memory_.place), std::uint64_t(memory_.visit)));
   const double size = memory_.swing * std::exp(-since / e.swing_decay_s);
   const auto mode = [&](double slower) {
     return std::sin(2 * std::numbers::pi * since / (slower * e.swing_period_s) + draws.turn());
@@ -218,12 +231,12 @@ void RigRobot::remember() const {
   const Eigen::Quaterniond& q = m.commanded.rotation;
   const Vector3d& t = m.commanded.translation;
   text << "rig-robot 1\n"
-       << "stop " << m.stop << "\nvisit " << m.visit << "\nclock " << m.clock_s << ' ' << m.arrived_s << ' ' << m.still_s << ' ' << m.swing
+       << "stop " << m.stop << "\nvisit " << m.visit << ' ' << m.place << "\nclock " << m.clock_s << ' ' << m.arrived_s << ' ' << m.still_s << ' ' << m.swing
        << "\nroll " << m.roll_rad << ' ' << m.turned_at << "\npose " << q.w() << ' ' << q.x() << ' ' << q.y() << ' '
        << q.z() << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << "\nlengths";
   for (const double length : m.lengths_m) text << ' ' << length;
   text << '\n';
-  for (const auto& [name, n] : m.visits) text << "been " << n << ' ' << name << '\n';
+  for (const auto& [place, n] : m.visits) text << "been " << n << ' ' << place << '\n';
   text << "end\n";
   // Not a result but a machine's state: it must not be torn, it need not survive a power cut.
   const std::filesystem::path aside = options_.memory.string() + ".new";
@@ -250,7 +263,7 @@ void RigRobot::recall() {
     if (word == "stop") {
       m.stop = rest();
     } else if (word == "visit") {
-      words >> m.visit;
+      words >> m.visit >> m.place;
     } else if (word == "clock") {
       words >> m.clock_s >> m.arrived_s >> m.still_s >> m.swing;
     } else if (word == "roll") {
@@ -265,8 +278,9 @@ void RigRobot::recall() {
       words.clear();
     } else if (word == "been") {
       int n = 0;
-      words >> n;
-      m.visits[rest()] = n;
+      std::uint64_t place = 0;
+      words >> n >> place;
+      m.visits[place] = n;
     } else if (word == "end") {
       whole = true;
     }

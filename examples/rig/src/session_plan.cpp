@@ -154,7 +154,7 @@ MadePlan make_plan(const SimulateOptions& o, const ObjectSize& object, double ce
                                " are out of the cables' reach");
           for (const std::string& reason : tour.left_out_why) made.notes.push_back("  " + reason);
         }
-        if (o.carrier == Carrier::automatic && out * 10 > reached + out)
+        if (o.carrier == Carrier::automatic && out * 4 > reached + out)
           why = made.notes.front();
         else if (reached >= n)
           break;

@@ -55,7 +55,7 @@ void check(const SimulateOptions& o) {
   expect(o.jpeg_quality >= 1 && o.jpeg_quality <= 100, "JPEG quality must be from 1 to 100");
   expect(o.room_radius_m == 0 || (o.room_radius_m > .05 && o.room_radius_m < 1000), "the room's radius must be from 0.05 to 1000 m");
   expect(o.radius_m == 0 || (o.radius_m > .01 && o.radius_m < 500), "the radius must be from 0.01 to 500 m");
-  expect(o.density >= .005 && o.density <= .4, "the sheets' density must be from 0.005 to 0.4");
+  expect(o.density > 0 && o.density <= .4, "the sheets' density must be above 0, at most 0.4");
   expect(o.circle_px == 0 || (o.circle_px >= 1 && o.circle_px <= 1000), "circles must be from 1 to 1000 px");
   expect(o.least_targets >= 0 && o.least_targets <= 1000, "least targets must be from 0 to 1000");
   expect(o.phi_from_rad >= 0 && o.phi_from_rad <= o.phi_to_rad && o.phi_to_rad < 3.2, "polar angles must ascend, from 0 to pi");
@@ -116,9 +116,11 @@ RigSession plan_session(const SimulateOptions& o, const std::optional<capture::P
   if (o.sheets) {
     const double circles = o.circle_px > 0 ? o.circle_px : 9;
     s.targets = scatter_targets(s.scene, s.lens.camera, s.radius_m,
-                                {.circle_px = circles, .spacing = 1 / std::sqrt(o.density), .seed = mix(o.seed, 5)});
+                                {.circle_px = circles, .density = o.density, .seed = mix(o.seed, 5)});
     const TargetSights sights(s.scene);
     const auto poor = add_sheets(s.targets, views, o.least_targets, sights, mix(o.seed, 7));
+    if (s.targets.placed.empty())
+      throw Error(ErrorCode::invalid_argument, "no sheet was hung: choose a larger density or smaller circles", "targets");
     if (!poor.empty())
       s.notes.push_back(std::to_string(poor.size()) + " of " + std::to_string(views.size()) +
                         " views decode fewer than " + std::to_string(o.least_targets) +

@@ -48,7 +48,7 @@ std::string options_json(const SimulateOptions& o) {
   json["photos"] = o.photos, json["carrier"] = int(o.carrier), json["radius_m"] = o.radius_m;
   json["phi_rad"] = {o.phi_from_rad, o.phi_to_rad};
   const RobotErrors& e = o.errors;
-  json["errors"] = {e.departure_m, e.attachment_m, e.offset_m, e.gain,   e.winch_m,   e.mount_m,        e.mount_rad,    e.bearing_rad,
+  json["errors"] = {e.departure_m, e.attachment_m, e.offset_m, e.gain,   e.winch_m, e.common_m, e.mount_m,        e.mount_rad,    e.bearing_rad,
                     e.table_m,     e.table_rad,    e.hand_m,   e.hand_rad, e.swing_m, e.swing_rad, e.swing_period_s, e.swing_decay_s};
   json["width"] = o.width, json["focal_mm"] = o.focal_mm, json["distortion"] = o.distortion;
   json["jpeg_quality"] = o.jpeg_quality, json["cables"] = o.cables;

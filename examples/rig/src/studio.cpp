@@ -51,7 +51,6 @@ Scene make_studio(Object object, const StudioOptions& o) {
   lamp(-1.05f, .75f, .85f, .070f, .76f, {1.f, .96f, .90f});
   lamp(-2.60f, .76f, .80f, .110f, .36f, {.92f, .97f, 1.f});
   lamp(1.15f, .70f, .90f, .080f, .46f, {1.f, .98f, .95f});
-  scene.ambient = Vector3f::Constant(.15f) + .30f * o.paint;
   return scene;
 }
 

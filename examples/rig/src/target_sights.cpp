@@ -126,7 +126,7 @@ std::vector<std::size_t> add_sheets(RoomTargets& targets, std::span<const View> 
     }
     if (seen < least) poor.push_back(i);
   }
-  targets.set.validate();
+  if (!targets.placed.empty()) targets.set.validate();
   return poor;
 }
 

@@ -22,7 +22,8 @@ struct RobotErrors {
   double attachment_m = .0005; ///< of each coordinate of an attachment, for good
   double offset_m = .002;      ///< of each winch's zero, for good
   double gain = .0003;         ///< of each drum's circumference, for good
-  double winch_m = .004;       ///< of each cable's length, anew at each arrival
+  double winch_m = .005;       ///< of each cable's length, anew at each arrival
+  double common_m = .009;      ///< of all lengths together (warmth, voltage), anew at each arrival: up and down
   double mount_m = .002, mount_rad = .004;  ///< of the camera on the platform, for good
   double bearing_rad = .005;                ///< where the bearing locks, anew at each turn
   // ---- turntables and hands
@@ -44,8 +45,9 @@ struct RobotErrors {
 /// mechanism that is not quite the plan's, and forward kinematics; then it swings.
 ///
 /// Time is the rig's own: it passes by moving and by `pass`, and is kept in a file with all else that the controller
-/// knows, so that a capture that was killed goes on with the same robot. What happens at a stop depends on seed, stop
-/// and how often the robot has been there, not on what happened before: a killed capture makes the same photographs.
+/// knows, so that a capture that was killed goes on with the same robot. What happens at a place depends on seed, place
+/// and how often the robot has come there, not on what happened before: a killed capture makes the same photographs. A
+/// move to where it is moves nothing.
 class RigRobot : public capture::Robot {
  public:
   struct Options {
@@ -82,7 +84,7 @@ class RigRobot : public capture::Robot {
     Pose cam_from_world;
     std::vector<CableLine> cables;
   };
-  /// Where the robot will be, at rest, when it is at a stop for the nth time; the bearing's own error is not in it.
+  /// Where the robot will be, at rest, when it comes to a stop's place for the nth time; the bearing's own error is not in it.
   Standing foreseen(const capture::PlannedStop& stop, int visit = 1) const;
 
   /// Where the true cables are at a time; none without a mechanism.
@@ -98,10 +100,12 @@ class RigRobot : public capture::Robot {
     double clock_s = 0, arrived_s = 0, still_s = 0, swing = 0;
     double roll_rad = 0;
     std::string turned_at;  ///< where the bearing was last turned
-    int visit = 0;          ///< of `stop`, from 1
+    std::uint64_t place = 0;  ///< what these lengths are known by; without a mechanism the stop's name
+    int visit = 0;            ///< of the place, from 1
     Pose commanded;  ///< of the platform; without a mechanism of the camera
-    std::map<std::string, int> visits;
+    std::map<std::uint64_t, int> visits;
   };
+  std::uint64_t place_of(const capture::PlannedStop& stop) const;
   Pose rest_of(const capture::PlannedStop& stop, int visit) const;
   Pose platform_at(double time_s) const;
   std::vector<CableLine> cables_to(const Pose& platform) const;

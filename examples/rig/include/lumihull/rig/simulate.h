@@ -18,7 +18,7 @@ namespace lumihull::rig {
 
 /// What carries the virtual camera.
 enum class Carrier : std::uint8_t {
-  automatic,  ///< the paper's mechanism where it can take nine tenths of the views, else `ideal`
+  automatic,  ///< the paper's mechanism where it can take three quarters of the views, else `ideal`
   cables,     ///< the paper's mechanism, with its errors
   turntable,
   hand,
@@ -37,7 +37,7 @@ struct SimulateOptions {
   bool blue = false;          ///< a blue enclosure
   double room_radius_m = 0;   ///< axis to panel; 0: 3 m, more where the camera's way asks for it
   bool sheets = true;         ///< printed targets on walls and floor
-  double density = .12;       ///< of the sheets: share of walls and floor that they cover, .005 … .4
+  double density = .12;       ///< of the sheets: share of walls and floor that they cover, at most .4
   double circle_px = 0;       ///< diameter of the targets' circles, seen straight; 0: 9, of a letter sheet at full size
   int least_targets = 5;      ///< more sheets are hung where a view of the plan decodes fewer
   // ---- the way

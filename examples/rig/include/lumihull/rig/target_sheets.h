@@ -28,11 +28,11 @@ struct RoomTargets {
 /// How sheets are spread over the enclosure.
 struct TargetSheetOptions {
   double circle_px = 12;  ///< diameter of the circles, seen straight from where cameras usually are
-  double spacing = 1.6;   ///< from one sheet to the next, in widths of a sheet; at least 1.5 (sheets lie askew)
+  double density = .3;    ///< share of walls and floor that sheets cover, at most .4; fewer where they find no place
   std::uint64_t seed = 1;
 };
 
-/// Scatters sheets with a target of matrix6x6 each over walls and floor: small ones around the object, large ones on
+/// Scatters sheets with a target of matrix6x6 each at random over walls and floor: small ones around the object, large ones on
 /// walls, so that cameras on a hemisphere of radius `distance` (m) around the scene's centre see enough of them all
 /// around (paper, 3.1: at least five in each picture). Dark green on light green, in the enclosure's own hue.
 /// Errors: invalid_argument (options; more sheets than the family has ids).
