@@ -33,8 +33,32 @@ struct PartKernel {
   }
 };
 
+/// The mean of several views' coverage.
+class MeanCoverage {
+ public:
+  MeanCoverage(std::span<const View> views, std::span<const FlatPrint> prints, const Eigen::Vector3f& background,
+               int lines, int parts) {
+    for (const View& view : views) coverages_.emplace_back(view, prints, background, lines, parts);
+    row_.resize(std::size_t(3 * FlatCoverage::kTile) * std::size_t(parts * parts) * std::size_t(views[0].camera.width));
+  }
+
+  /// As FlatCoverage's; `values` is how many it fills.
+  void tile_row(int first_row, float* out, std::size_t values) {
+    if (coverages_.size() == 1) return coverages_[0].tile_row(first_row, out);
+    std::fill_n(out, values, 0.f);
+    for (FlatCoverage& coverage : coverages_) {
+      coverage.tile_row(first_row, row_.data());
+      add_scaled(out, 1 / float(coverages_.size()), row_.data(), values);
+    }
+  }
+
+ private:
+  std::vector<FlatCoverage> coverages_;
+  std::vector<float> row_;
+};
+
 /// Coverage by parts, blurred and sampled at the pixels.
-Image sampled(FlatCoverage& coverage, int width, int height, double sigma, int parts) {
+Image sampled(MeanCoverage& coverage, int width, int height, double sigma, int parts) {
   constexpr int kTile = FlatCoverage::kTile;
   const PartKernel kernel(sigma, parts);
   const int taps = int(kernel.weight.size());
@@ -57,8 +81,8 @@ Image sampled(FlatCoverage& coverage, int width, int height, double sigma, int p
     const int first = y * parts - kernel.before, last = std::min(first + taps, fine_rows);
     while (ready < last) {
       const int row = ready / parts;
-      coverage.tile_row(row, tile.data());
       const int n = std::min(kTile, height - row) * parts;
+      coverage.tile_row(row, tile.data(), std::size_t(n) * values);
       for (int i = 0; i < n; ++i)
         std::copy_n(&tile[std::size_t(i) * values], values, &rows[std::size_t((ready + i) % ring) * values]);
       ready += n;
@@ -92,12 +116,12 @@ Image sampled(FlatCoverage& coverage, int width, int height, double sigma, int p
 
 }  // namespace
 
-Image blurred_coverage(const View& view, std::span<const FlatPrint> prints, const Eigen::Vector3f& background,
-                       int lines, double sigma) {
-  const int width = view.camera.width, height = view.camera.height;
+Image blurred_coverage(std::span<const View> views, std::span<const FlatPrint> prints,
+                       const Eigen::Vector3f& background, int lines, double sigma) {
+  const int width = views[0].camera.width, height = views[0].camera.height;
   // Gaussians much narrower than a part are not seen by its samples.
   const int parts = sigma > 0 ? std::clamp(int(std::ceil(.75 / sigma)), kParts, 8) : 1;
-  FlatCoverage coverage(view, prints, background, lines, parts);
+  MeanCoverage coverage(views, prints, background, lines, parts);
   if (sigma > 0) {
     const double fine = sigma < kAllFine ? sigma : kFineSigma;
     Image image = sampled(coverage, width, height, fine, parts);
@@ -105,7 +129,9 @@ Image blurred_coverage(const View& view, std::span<const FlatPrint> prints, cons
     return image;
   }
   Image image = Image::uninitialized(width, height, 3, PixelType::f32);
-  for (int y = 0; y < height; y += FlatCoverage::kTile) coverage.tile_row(y, image.row<float>(y));
+  for (int y = 0; y < height; y += FlatCoverage::kTile)
+    coverage.tile_row(y, image.row<float>(y),
+                      std::size_t(3) * std::size_t(width) * std::size_t(std::min(FlatCoverage::kTile, height - y)));
   return image;
 }
 

@@ -10,8 +10,9 @@
 namespace lumihull::rig {
 
 /// Linear light of sheets before a background through a lens that blurs, f32, 3 channels: a Gaussian of `sigma` px (0:
-/// none) and the pixel's square. What lies beyond the picture is as at its border.
-Image blurred_coverage(const View& view, std::span<const FlatPrint> prints, const Eigen::Vector3f& background,
-                       int lines, double sigma);
+/// none) and the pixel's square. What lies beyond the picture is as at its border. Of several views, which have one
+/// camera, the mean: they are moments of the exposure.
+Image blurred_coverage(std::span<const View> views, std::span<const FlatPrint> prints,
+                       const Eigen::Vector3f& background, int lines, double sigma);
 
 }  // namespace lumihull::rig

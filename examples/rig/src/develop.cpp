@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "bayer.h"
 #include "noise.h"
 #include "srgb_table.h"
 
@@ -42,7 +43,7 @@ std::vector<Tap> taps(int n, int source, int factor) {
 }  // namespace
 
 Image develop(const Image& light, const PhotoOptions& options, std::uint64_t seed, Job& job) {
-  Image picture(light.width(), light.height(), 3);
+  Image exposed(light.width(), light.height(), 3, PixelType::f32);
   const std::vector<std::uint8_t>& table = srgb_table();
   const std::size_t values = std::size_t(light.width()) * 3;
   const float gain = float(options.exposure);
@@ -52,13 +53,22 @@ Image develop(const Image& light, const PhotoOptions& options, std::uint64_t see
   parallel_chunks(job, std::size_t(light.height()), kRows, [&](std::size_t first, std::size_t last) {
     for (std::size_t y = first; y < last; ++y) {
       const float* in = light.row<float>(int(y));
-      std::uint8_t* out = picture.row<std::uint8_t>(int(y));
+      float* out = exposed.row<float>(int(y));
       for (std::size_t i = 0; i < values; ++i) {
         float x = std::max(0.f, in[i] * gain);
         if (shot > 0)
           x += std::sqrt(x * shot + read * read) * gaussian(mix(seed + (y * values + i) * 0xd1342543de82ef95ull));
-        out[i] = table[std::size_t(std::clamp(x, 0.f, 1.f) * 65535.f + .5f)];
+        out[i] = x;
       }
+    }
+  });
+  if (options.bayer) exposed = through_bayer(exposed, true);
+  Image picture = Image::uninitialized(light.width(), light.height(), 3);
+  parallel_chunks(job, std::size_t(light.height()), kRows, [&](std::size_t first, std::size_t last) {
+    for (int y = int(first); y < int(last); ++y) {
+      const float* in = exposed.row<float>(y);
+      std::uint8_t* out = picture.row<std::uint8_t>(y);
+      for (std::size_t i = 0; i < values; ++i) out[i] = table[std::size_t(std::clamp(in[i], 0.f, 1.f) * 65535.f + .5f)];
     }
   });
   return picture;

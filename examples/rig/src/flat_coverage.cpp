@@ -454,6 +454,7 @@ void FlatCoverage::Renderer::tile(int x0, int y0, float* out) {
 FlatCoverage::FlatCoverage(const View& view, std::span<const FlatPrint> prints, const Vector3f& background, int lines,
                            int parts)
     : renderer_(std::make_unique<Renderer>(view, prints, background, lines, parts)) {}
+FlatCoverage::FlatCoverage(FlatCoverage&&) noexcept = default;
 FlatCoverage::~FlatCoverage() = default;
 
 void FlatCoverage::tile_row(int first_row, float* out) {

@@ -18,6 +18,7 @@ class FlatCoverage {
   /// lines: scan lines a pixel where edges pass. view and prints are valid; prints outlive the object.
   FlatCoverage(const View& view, std::span<const FlatPrint> prints, const Eigen::Vector3f& background, int lines,
                int parts);
+  FlatCoverage(FlatCoverage&&) noexcept;
   ~FlatCoverage();
 
   /// Pixel rows first_row … first_row + kTile - 1, or up to the picture's end; first_row is a multiple of kTile.

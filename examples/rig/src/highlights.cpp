@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -24,9 +25,17 @@ namespace {
 /// A glossy object with the normals that it is shaded with.
 struct Mirror {
   int object = 0;
-  Material material;
+  std::vector<Material> materials;
+  std::function<int(const Vector3f&)> material_at;
+  Vector3f foot{0, 0, 0};
   ShadingMesh shape;
   double size = 1;  ///< longest side, m
+
+  const Material& at(const Vector3d& point) const {
+    if (!material_at) return materials[0];
+    const int k = material_at((point.cast<float>() - foot) / float(size));
+    return materials[std::size_t(std::clamp(k, 0, int(materials.size()) - 1))];
+  }
 };
 
 struct MirrorPoint {
@@ -149,9 +158,14 @@ HighlightFinder::HighlightFinder(const Scene& scene) : impl_(new Impl{Room(scene
     const auto first = std::uint32_t(all.vertices.size());
     all.vertices.insert(all.vertices.end(), object.mesh.vertices.begin(), object.mesh.vertices.end());
     for (const auto& [a, b, c] : object.mesh.triangles) all.triangles.push_back({a + first, b + first, c + first});
-    if (object.material.unlit || object.material.reflectance <= 0) continue;
+    std::vector<Material> materials{object.material};
+    materials.insert(materials.end(), object.others.begin(), object.others.end());
+    if (std::none_of(materials.begin(), materials.end(),
+                     [](const Material& m) { return !m.unlit && m.reflectance > 0; }))
+      continue;
     const auto [low, high] = bounding_box(object.mesh);
-    impl_->mirrors.push_back({int(i), object.material, shading_mesh(object, std::numeric_limits<float>::infinity()),
+    impl_->mirrors.push_back({int(i), std::move(materials), object.material_at, Vector3f(0, 0, low.z()),
+                              shading_mesh(object, std::numeric_limits<float>::infinity()),
                               double((high - low).maxCoeff())});
   }
   if (!all.empty()) impl_->rays.emplace(all);
@@ -173,7 +187,9 @@ std::vector<Highlight> HighlightFinder::find(const View& view) const {
       for (const auto& [point, normal] : impl_->mirror_points(mirror, {eye, shine})) {
         const Vector3d to_eye = eye - point, to_lamp = shine - point;
         const double distance = to_lamp.norm();
-        const float gloss_here = gloss(mirror.material, normal.cast<float>(), (to_lamp / distance).cast<float>(),
+        const Material& material = mirror.at(point);
+        if (material.unlit) continue;
+        const float gloss_here = gloss(material, normal.cast<float>(), (to_lamp / distance).cast<float>(),
                                        to_eye.normalized().cast<float>(), float(lamp.radius / distance));
         if (!(gloss_here > 0)) continue;  // the surface's back
         const auto pixel = view.project(point);

@@ -69,7 +69,9 @@ LitScene::LitScene(const Scene& scene, const LightOptions& options, Job& job)
 void LitScene::add(const Object& object, float vertex_spacing) {
   const auto [low, high] = bounding_box(object.mesh);
   Part part;
-  part.material = object.material;
+  part.materials = {object.material};
+  part.materials.insert(part.materials.end(), object.others.begin(), object.others.end());
+  part.material_at = object.material_at;
   part.foot = Vector3f(0, 0, low.z());
   part.size = (high - low).maxCoeff();
   part.texture = object.texture;
@@ -278,8 +280,13 @@ Vector3f LitScene::blurred_room(const Vector3f& from, const Vector3f& way, float
   return radiance;
 }
 
-Vector3f LitScene::base_color(const Part& part, const Hit& hit, const Vector3f& point) const {
-  if (part.texture.empty()) return pattern_color(part.material, (point - part.foot) / part.size);
+const Material& LitScene::Part::at(const Vector3f& point) const {
+  if (!material_at) return materials[0];
+  return materials[std::size_t(std::clamp(material_at((point - foot) / size), 0, int(materials.size()) - 1))];
+}
+
+Vector3f LitScene::base_color(const Part& part, const Material& material, const Hit& hit, const Vector3f& point) const {
+  if (part.texture.empty()) return pattern_color(material, (point - part.foot) / part.size);
   const auto& uv = part.uv[hit.triangle - part.first_triangle];
   const Vector2f at = (1 - hit.b1 - hit.b2) * uv[0] + hit.b1 * uv[1] + hit.b2 * uv[2];
   const Vector2f wrapped = at - at.array().floor().matrix();
@@ -310,10 +317,10 @@ Vector3f LitScene::object_radiance(const Ray& ray, const Hit& hit) const {
     cos_v = normal.dot(view);
   }
   const Part& part = parts_[object_of_[hit.triangle]];
-  const Material& m = part.material;
+  const Material& m = part.at(point);
   if (m.unlit) return m.colors[0];
   const float mirrored = mirror(m, cos_v);
-  Vector3f radiance = (1 - mirrored) * base_color(part, hit, point).cwiseProduct(light);
+  Vector3f radiance = (1 - mirrored) * base_color(part, m, hit, point).cwiseProduct(light);
   const Vector3f start = point + offset_ * normal;
   for (const Lamp& lamp : lamps_) {
     const Vector3f way = lamp.position - point;

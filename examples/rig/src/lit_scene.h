@@ -28,6 +28,8 @@ class LitScene {
   LitScene(const Scene& scene, const LightOptions& options, Job& job);
 
   const Room& room() const { return room_; }
+  /// Of the ball around all objects.
+  const Eigen::Vector3f& center() const { return center_; }
   /// First object along each ray; all misses in an empty room.
   void hit(std::span<const hull::Ray> rays, std::span<hull::Hit> hits) const;
   /// Index of the object that a triangle belongs to.
@@ -41,12 +43,15 @@ class LitScene {
 
  private:
   struct Part {
-    Material material;
+    std::vector<Material> materials;
+    std::function<int(const Eigen::Vector3f&)> material_at;
     std::uint32_t first_triangle = 0;
     Eigen::Vector3f foot{0, 0, 0};
     float size = 1;
     std::vector<std::array<Eigen::Vector2f, 3>> uv;
     Image texture;
+
+    const Material& at(const Eigen::Vector3f& point) const;
   };
 
   void add(const Object& object, float vertex_spacing);
@@ -54,7 +59,8 @@ class LitScene {
   void light_objects(const LightOptions& options, Job& job);
   Eigen::Vector3f lamps_at(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, int rays,
                            std::uint64_t turn) const;
-  Eigen::Vector3f base_color(const Part& part, const hull::Hit& hit, const Eigen::Vector3f& point) const;
+  Eigen::Vector3f base_color(const Part& part, const Material& material, const hull::Hit& hit,
+                             const Eigen::Vector3f& point) const;
   /// What a mirror shows whose reflections turn by up to `blur` (sine): the ceiling's bright edge is softened, the only
   /// one with much contrast.
   Eigen::Vector3f blurred_room(const Eigen::Vector3f& from, const Eigen::Vector3f& way, float blur) const;

@@ -78,6 +78,16 @@ Vector3f pattern_color(const Material& m, const Vector3f& q) {
       color = lerp(color, m.colors[2], smoothstep(.12f, .18f, spot));
       break;
     }
+    case Pattern::fur: {
+      // Hairs hang down and back: noise that is stretched that way, finer across it.
+      const Vector3f along(q.x() * 130, (q.y() + .5f * q.z()) * 70, (q.z() - .4f * q.y()) * 22);
+      const float hair = fractal_noise(along, 3, 21), tuft = fractal_noise(q * 14, 3, 22);
+      const float below = smoothstep(.0f, .14f, -q.y() - .9f * (q.z() - .30f) + .05f * tuft);
+      const float above = smoothstep(.0f, .10f, q.z() - .52f + .25f * q.y() + .05f * tuft);
+      color = lerp(lerp(m.colors[0], m.colors[1], .75f * below), m.colors[2], .7f * above);
+      color *= std::clamp(1 + .9f * hair + .35f * tuft, .35f, 1.9f);
+      break;
+    }
     case Pattern::pottery:
       color = pottery(m, q);
       break;

@@ -2,13 +2,13 @@
 #include <lumihull/rig/flat_print.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "bayer.h"
 #include "blurred_coverage.h"
 #include "noise.h"
 #include "srgb_table.h"
@@ -81,35 +81,6 @@ void add_noise(Image& image, const PrintPhotoOptions& o, std::uint64_t seed) {
   }
 }
 
-/// One colour a pixel (RGGB), the others from the mean of the nearest pixels that have them.
-Image through_bayer(const Image& image, bool clip) {
-  const int w = image.width(), h = image.height();
-  const auto color_at = [](int x, int y) { return (y & 1) + (x & 1); };  // 0 red, 1 green, 2 blue
-  const auto value = [&](int x, int y, int c) {
-    const float v = image.row<float>(y)[3 * x + c];
-    return clip ? std::clamp(v, 0.f, 1.f) : v;
-  };
-  Image result(w, h, 3, PixelType::f32);
-  for (int y = 0; y < h; ++y) {
-    float* out = result.row<float>(y);
-    for (int x = 0; x < w; ++x, out += 3) {
-      const int own = color_at(x, y);
-      std::array<float, 3> sum{}, weight{};
-      for (int dy = -1; dy <= 1; ++dy)
-        for (int dx = -1; dx <= 1; ++dx) {
-          const int u = x + dx, v = y + dy;
-          if (u < 0 || v < 0 || u >= w || v >= h) continue;
-          const int c = color_at(u, v);
-          // Green lacks at red and blue places and has four neighbours beside it; its own diagonals do not count.
-          if (c == own && (dx != 0 || dy != 0)) continue;
-          sum[std::size_t(c)] += value(u, v, c), weight[std::size_t(c)] += 1;
-        }
-      for (std::size_t c = 0; c < 3; ++c) out[c] = weight[c] > 0 ? sum[c] / weight[c] : sum[std::size_t(own)];
-    }
-  }
-  return result;
-}
-
 Image to_srgb(const Image& light) {
   Image picture = Image::uninitialized(light.width(), light.height(), 3);
   const std::vector<std::uint8_t>& table = srgb_table();
@@ -131,7 +102,7 @@ Image photograph_prints(const View& view, std::span<const FlatPrint> prints, con
   if (!background.allFinite()) refuse("must be finite", "background");
   for (std::size_t i = 0; i < prints.size(); ++i) check(prints[i], i);
 
-  Image image = blurred_coverage(view, prints, background, options.edge_samples, options.blur_px);
+  Image image = blurred_coverage({&view, 1}, prints, background, options.edge_samples, options.blur_px);
   light(image, options);
   add_noise(image, options, seed);
   if (options.bayer) image = through_bayer(image, !linear);

@@ -44,6 +44,8 @@ Object object_by_name(const std::string& name, double size) {
   if (name == "vase") return make_vase(size);
   if (name == "bust") return make_bust(size);
   if (name == "statue") return make_statue(size);
+  if (name == "snowmobile") return make_snowmobile(size);
+  if (name == "deer") return make_deer(size);
   if (name == "gate") return make_gate(size);
   if (name == "box") return make_box(size);
   if (name == "sphere") return make_sphere(size);
@@ -52,7 +54,7 @@ Object object_by_name(const std::string& name, double size) {
   const std::string extension = file.extension().string();
   if (extension != ".obj" && extension != ".ply")
     throw Error(ErrorCode::invalid_argument,
-                "expected vase, bust, statue, gate, box, sphere, pebble, or a mesh file (.obj, .ply)", name);
+                "expected vase, bust, statue, snowmobile, deer, gate, box, sphere, pebble, or a mesh file (.obj, .ply)", name);
   const bool obj = extension == ".obj";
   fs::path texture = file;
   texture.replace_extension(".png");

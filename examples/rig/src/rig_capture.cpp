@@ -40,7 +40,11 @@ struct Session {
 Object object_of(const RigOptions& o) {
   Object object = object_by_name(o.object, o.size_m);
   Material& m = object.material;
-  if (o.matt) m.reflectance = 0;
+  if (o.unlit || o.uniform) object.material_at = nullptr, object.others.clear();
+  if (o.matt) {
+    m.reflectance = 0;
+    for (Material& other : object.others) other.reflectance = 0;
+  }
   if (o.unlit) {
     for (int c = 0; c < 3; ++c)
       m.colors[0][c] = linear_from_srgb(float((*o.unlit)[std::size_t(c)]) / 255) / float(o.photo.exposure);

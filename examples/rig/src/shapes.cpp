@@ -10,32 +10,13 @@
 
 #include "icosphere.h"
 #include "noise.h"
-#include "polygonize.h"
+#include "solids.h"
 
 namespace lumihull::rig {
 
 namespace {
 
 using Eigen::Vector3f;
-
-/// Smooth minimum: a union with a fillet of about k (Quilez, polynomial form).
-float blend(float a, float b, float k) {
-  const float h = std::fmax(k - std::fabs(a - b), 0.f) / k;
-  return std::fmin(a, b) - h * h * k * 0.25f;
-}
-float cut(float a, float b, float k) { return -blend(-a, -b, k); }  // smooth maximum: an intersection
-
-float ellipsoid(const Vector3f& p, const Vector3f& c, const Vector3f& r) {
-  const Vector3f q = p - c;
-  const float k0 = q.cwiseQuotient(r).norm(), k1 = q.cwiseQuotient(r.cwiseProduct(r)).norm();
-  return k1 > 0 ? k0 * (k0 - 1) / k1 : -r.minCoeff();
-}
-
-float capsule(const Vector3f& p, const Vector3f& a, const Vector3f& b, float ra, float rb) {
-  const Vector3f ab = b - a;
-  const float t = std::clamp((p - a).dot(ab) / ab.squaredNorm(), 0.f, 1.f);
-  return (p - a - t * ab).norm() - (ra + t * (rb - ra));
-}
 
 float vase_radius(float z) {
   static constexpr float kProfile[][2] = {{-.1f, .19f},  {0, .19f},     {.05f, .165f}, {.18f, .27f},
@@ -123,22 +104,25 @@ float gate(const Vector3f& p) {
   return cut(d, -p.z(), .01f);
 }
 
-Object from_formula(const char* name, float (*formula)(const Vector3f&), const Vector3f& low, const Vector3f& high,
-                    double size, int detail) {
+}  // namespace
+
+Object from_formula(const char* name, const std::function<float(const Vector3f&)>& formula, const Vector3f& low,
+                    const Vector3f& high, double size, int detail, float length,
+                    const std::function<int(const Vector3f&)>& material_at) {
   if (detail < 8 || detail > 1000)
     throw Error(ErrorCode::invalid_argument, "detail must be from 8 to 1000 cells", name);
-  Polygons polygons = polygonize(formula, low, high, 1.f / float(detail));
+  Polygons polygons = polygonize(formula, low, high, length / float(detail));
   Object object;
   object.name = name;
   object.mesh = std::move(polygons.mesh);
   object.normals = std::move(polygons.normals);
   const auto [a, b] = bounding_box(object.mesh);
-  const float scale = float(size) / (b - a).maxCoeff();
-  for (Vector3f& v : object.mesh.vertices) v = Vector3f(v.x(), v.y(), v.z() - a.z()) * scale;
+  const float unit = (b - a).maxCoeff(), scale = float(size) / unit, foot = a.z();
+  for (Vector3f& v : object.mesh.vertices) v = Vector3f(v.x(), v.y(), v.z() - foot) * scale;
+  if (material_at)
+    object.material_at = [=](const Vector3f& place) { return material_at(place * unit + Vector3f(0, 0, foot)); };
   return object;
 }
-
-}  // namespace
 
 std::array<Vector3f, 2> bounding_box(const hull::Mesh& mesh) {
   std::array<Vector3f, 2> box{Vector3f::Constant(INFINITY), Vector3f::Constant(-INFINITY)};

@@ -62,26 +62,26 @@ hull::Ray Shutter::ray(const Vector3d& direction, const Vector2d& lens, double t
           (moment.world_from_cam * (direction - from / focus_m_)).cast<float>()};
 }
 
-namespace {
-
-/// A step through 0 … n - 1 that visits each once.
-int step_through(int n, std::uint64_t hash) {
-  int step = 1 + int(hash % std::uint64_t(n));
-  while (std::gcd(step, n) != 1) step = step % n + 1;
-  return step;
+PixelSamples::PixelSamples(int side) : side_(side) {
+  lens_.resize(std::size_t(side) * std::size_t(side));
+  std::iota(lens_.begin(), lens_.end(), 0);
+  time_ = lens_;
 }
 
-}  // namespace
-
-PixelSamples::PixelSamples(std::uint64_t hash, int side)
-    : hash_(hash),
-      side_(side),
-      count_(side * side),
-      lens_step_(step_through(count_, mix(hash, 1))),
-      time_step_(step_through(count_, mix(hash, 2))) {}
+void PixelSamples::shuffle(std::uint64_t hash) {
+  hash_ = hash;
+  std::uint64_t random = hash;
+  for (std::vector<int>* parts : {&lens_, &time_}) {
+    std::iota(parts->begin(), parts->end(), 0);  // the order is this pixel's alone
+    for (std::size_t i = parts->size() - 1; i > 0; --i) {
+      random = mix(random);
+      std::swap((*parts)[i], (*parts)[std::size_t((random >> 32) * (i + 1) >> 32)]);
+    }
+  }
+}
 
 Vector2d PixelSamples::lens(int ray) const {
-  const int cell = int((std::int64_t(ray) * lens_step_ + std::int64_t(mix(hash_, 3) >> 33)) % count_);
+  const int cell = lens_[std::size_t(ray)];
   const std::uint64_t random = mix(hash_, 8 + 2 * std::uint64_t(ray));
   const double x = 2 * (cell % side_ + unit_double(random)) / side_ - 1;
   const double y = 2 * (cell / side_ + unit_double(mix(random))) / side_ - 1;
@@ -93,8 +93,7 @@ Vector2d PixelSamples::lens(int ray) const {
 }
 
 double PixelSamples::time(int ray) const {
-  const int cell = int((std::int64_t(ray) * time_step_ + std::int64_t(mix(hash_, 4) >> 33)) % count_);
-  return (cell + unit_double(mix(hash_, 9 + 2 * std::uint64_t(ray)))) / count_;
+  return (time_[std::size_t(ray)] + unit_double(mix(hash_, 9 + 2 * std::uint64_t(ray)))) / double(time_.size());
 }
 
 }  // namespace lumihull::rig

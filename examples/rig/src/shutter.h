@@ -17,6 +17,10 @@ namespace lumihull::rig {
 struct Moment {
   Eigen::Matrix3d world_from_cam;
   Eigen::Vector3d center;
+
+  Pose cam_from_world() const {
+    return Pose::from_matrix(world_from_cam.transpose(), -world_from_cam.transpose() * center);
+  }
 };
 
 /// The lens' opening and the time that it is open: where the rays of a pixel start, and when.
@@ -27,6 +31,7 @@ class Shutter {
 
   /// Whether all rays start at one point: a pinhole that does not move.
   bool still() const { return radius_m_ == 0 && moments_.size() == 1; }
+  bool moves() const { return moments_.size() > 1; }
   double radius_m() const { return radius_m_; }  ///< of the opening
   double focus_m() const { return focus_m_; }    ///< depth of the sharp plane
   /// Diameter of the circle of confusion at a depth, px: f A |1 / depth - 1 / focus|, f in px.
@@ -47,17 +52,21 @@ class Shutter {
   double radius_m_ = 0, focus_m_ = 1;
 };
 
-/// The lens' points and times of a pixel's n rays: each set is stratified (n a square: a point in each square of the
-/// unit square, mapped to the disc by Shirley & Chiu 1997), and paired with the pixel's rays at random (Cook 1986).
+/// The lens' points and times of a pixel's side x side rays: each set is stratified (a point in each square of the unit
+/// square, mapped to the disc by Shirley & Chiu 1997; a time in each part of the exposure), and paired with the pixel's
+/// rays at random (Cook 1986).
 class PixelSamples {
  public:
-  PixelSamples(std::uint64_t hash, int side);
+  explicit PixelSamples(int side);
+  /// Another pixel's.
+  void shuffle(std::uint64_t hash);
   Eigen::Vector2d lens(int ray) const;
   double time(int ray) const;
 
  private:
-  std::uint64_t hash_;
-  int side_, count_, lens_step_, time_step_;
+  int side_;
+  std::uint64_t hash_ = 0;
+  std::vector<int> lens_, time_;  ///< parts of lens and time by ray
 };
 
 }  // namespace lumihull::rig

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ enum class Pattern : std::uint8_t {
   marble,   ///< colors[0] with veins of [1]
   patches,  ///< colors[0] with islands of [1] and spots of [2], edges about 1/100 of the object's size soft
   pottery,  ///< colors[0] with painted bands and zigzags of [1] and [2]
+  fur,      ///< colors[0] in strands of lighter and darker hair, [1] below chin and neck, [2] on crown and nape
 };
 
 /// What a surface looks like. Colours are linear reflectances, 0 … 1.
@@ -41,6 +43,10 @@ struct Object {
   std::vector<std::array<Eigen::Vector2f, 3>> uv;  ///< one a triangle's corner, v upwards; empty: no texture
   Image texture;                                   ///< 8-bit sRGB, 3 channels, or empty: `material.pattern`
   Material material;
+  /// Further materials, and which a place has: 0 is `material`, k is others[k - 1]. The place is in units of the
+  /// longest side, from the middle of the foot, as patterns see it. Empty: `material` all over.
+  std::vector<Material> others;
+  std::function<int(const Eigen::Vector3f& place)> material_at;
   float stand = 0;  ///< radius of the pedestal that suits it, m; 0: a quarter wider than the object
 };
 
@@ -53,6 +59,10 @@ Object make_vase(double size, int detail = 100);
 Object make_bust(double size, int detail = 100);
 Object make_statue(double size, int detail = 130);
 Object make_gate(double size, int detail = 100);
+/// Stand-ins for the objects of the paper's table 1. snowmobile: 2.8 m long, lacquered, with black parts, an opaque
+/// dark windscreen, skis, a track (front at -x). deer: a matt furry head on its neck, with antlers (genus 0).
+Object make_snowmobile(double size, int detail = 150);
+Object make_deer(double size, int detail = 130);
 Object make_box(double size);
 Object make_sphere(double size, int subdivisions = 6);
 
@@ -69,8 +79,9 @@ double pebble_function(const Eigen::Vector3d& p, Eigen::Vector3d* gradient = nul
 /// missing, not finite or indices are out of range.
 Object read_object(const std::filesystem::path& mesh, const std::filesystem::path& texture, double size, bool y_up);
 
-/// By name ("vase", "bust", "statue", "gate", "box", "sphere", "pebble") or a mesh file (y up for OBJ, z up for PLY; a
-/// PNG of the same name beside an OBJ is its texture). Error{invalid_argument} for a name that is neither.
+/// By name ("vase", "bust", "statue", "snowmobile", "deer", "gate", "box", "sphere", "pebble") or a mesh file (y up for
+/// OBJ, z up for PLY; a PNG of the same name beside an OBJ is its texture). Error{invalid_argument} for a name that is
+/// neither.
 Object object_by_name(const std::string& name, double size);
 
 /// The object's bounding box in its mesh: {low, high}; undefined for an empty mesh.
