@@ -24,7 +24,7 @@ struct Size {
   double circle_px() const { return full ? 9 : 6.5; }
   double density() const { return full ? 0.12 : 0.25; }  ///< share of walls and floor under sheets
   int photos(int papers) const { return full ? papers : 24; }
-  int visits() const { return full ? 25 : 5; }           ///< of each place, photographed (the robot's own: always 25)
+  int visits() const { return full ? 25 : 5; }  ///< of each place, photographed (the robot's own: always 25)
   const char* name() const { return full ? "full" : "reduced"; }
 };
 

@@ -9,6 +9,7 @@
 #include <cstdio>
 
 #include "experiment.h"
+#include "model.h"
 
 namespace ex = lumihull::experiments;
 namespace fs = std::filesystem;
@@ -57,7 +58,8 @@ int main(int argc, char** argv) {
   lumihull::Job job(
       [](const lumihull::Progress& p) {
         static std::string ended;
-        if (p.done == p.total && p.stage != ended) std::fprintf(stderr, "    %-32s %.1f s\n", p.stage.c_str(), p.elapsed_s);
+        if (p.done == p.total && p.stage != ended)
+          std::fprintf(stderr, "    %-32s %.1f s\n", p.stage.c_str(), p.elapsed_s);
         ended = p.done == p.total ? p.stage : "";
       },
       threads);
@@ -77,6 +79,11 @@ int main(int argc, char** argv) {
         ex::Json result = e.run(at, size, job);
         result["seconds"] = watch.seconds();
         lumihull::write_file(file, result.dump(1) + "\n");
+      }
+      const fs::path picture = at / "overview.jpg";
+      if (wanted && !fs::exists(picture) && fs::exists(at / "capture" / "light_field.glb")) {
+        const lumihull::Image strip = ex::overview(lumihull::Capture::open(at / "capture"), job);
+        if (!strip.empty()) lumihull::write_jpeg(picture, strip, 80);
       }
       if (fs::exists(file)) results[e.name] = ex::Json::parse(lumihull::read_file(file));
     } catch (const std::exception& error) {

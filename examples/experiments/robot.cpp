@@ -113,7 +113,14 @@ Json measure_repeatability(const fs::path& folder, const Size& size, Job& job) {
   rig::SimulateOptions s;
   s.object = "box";
   s.size_m = 0.3;
-  s.plan = capture::repeatability_plan(mechanism, options);
+  // The corners see different walls: views from around tie them together, as the paper's model of the targets does.
+  capture::Plan both = capture::repeatability_plan(mechanism, options);
+  capture::HemisphereOptions around;
+  around.azimuths = 16, around.rows = 2;
+  around.phi_from_rad = 0.6, around.phi_to_rad = 1.2;
+  const auto views = capture::hemisphere_stops(mechanism, around);
+  both.stops.insert(both.stops.end(), views.begin(), views.end());
+  s.plan = both;
   s.width = size.width();
   s.circle_px = size.circle_px();
   s.density = size.density();
@@ -128,6 +135,7 @@ Json measure_repeatability(const fs::path& folder, const Size& size, Job& job) {
   for (const Shot& shot : capture.shots) {
     if (!shot.cam_from_world || !shot.commanded) continue;
     ++placed;
+    if (shot.commanded->stop[0] != 'p') continue;
     measured[place_of(shot.commanded->stop)].push_back(shot.cam_from_world->inverse());
   }
   out["photographed_visits"] = options.visits;
@@ -299,9 +307,7 @@ Json measure_large(const fs::path& folder, const Size& size, Job& job) {
   s.room_radius_m = 0;
   s.lens_photos = 0, s.empty_photos = 6, s.test_views = 4;
   s.photo.blur_px = 0.6;
-  out["model"] = model_of(folder / "capture", s, job);
-  const Image strip = overview(Capture::open(folder / "capture"), job);
-  if (!strip.empty()) write_jpeg(folder / "overview.jpg", strip, 80);
+  out["model"] = model_of(folder / "capture", s, size, job);
   return out;
 }
 

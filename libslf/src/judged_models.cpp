@@ -74,7 +74,6 @@ TestViewEvaluation evaluate_test_views(const fs::path& folder, const Methods& me
                   "expected the highlights of view \"" + views[i].name + "\", not of \"" + truth[i].name + "\"",
                   truth_file.string());
   if (!folder_of_pictures.empty()) fs::create_directories(folder_of_pictures);
-  job.begin("test views", views.size());
   TestViewEvaluation out;
   out.views = views.size();
   MeanQualities means;
@@ -96,9 +95,7 @@ TestViewEvaluation evaluate_test_views(const fs::path& folder, const Methods& me
     }
     if (!truth.empty()) pictures["photograph"].push_back(reference);
     means.add(qualities);
-    job.advance();
   }
-  job.end();
   out.methods = means.value();
   try {
     for (const auto& [name, of_method] : pictures)

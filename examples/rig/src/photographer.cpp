@@ -256,7 +256,6 @@ Photographer::~Photographer() = default;
 
 Photo Photographer::photograph(const View& view, const PhotoOptions& options, std::uint64_t seed, Job& job,
                                std::span<const Pose> during) const {
-  (void)during;
   check(options);
   view.camera.validate();
   const LitScene& scene = impl_->scene;
