@@ -128,7 +128,9 @@ std::string stability_svg(std::span<const double> time_s, std::span<const double
   for (const double d : displacement_px) most = std::max(most, std::abs(d));
   const auto settled = settle_time_s(time_s, displacement_px, allowed_px);
   SvgFigure figure("Displacement after the stop", 900, 420);
-  figure.axes(time_s.front(), time_s.back(), -1.05 * most, 1.05 * most, "s", "px");
+  const bool distances = std::all_of(displacement_px.begin(), displacement_px.end(), [](double d) { return d >= 0; });
+  const double lowest = distances ? 0 : -1.05 * most;
+  figure.axes(time_s.front(), time_s.back(), lowest, 1.05 * most, "s", "px");
   char note[100];
   if (settled)
     std::snprintf(note, sizeof note, "within %g px from %.2f s on", allowed_px, *settled);
@@ -136,8 +138,8 @@ std::string stability_svg(std::span<const double> time_s, std::span<const double
     std::snprintf(note, sizeof note, "not within %g px at the end", allowed_px);
   figure.note(note);
   for (const double level : {-allowed_px, allowed_px})
-    figure.line(time_s.front(), level, time_s.back(), level, "level");
-  if (settled) figure.line(*settled, -most, *settled, most, "mean");
+    if (level > lowest) figure.line(time_s.front(), level, time_s.back(), level, "level");
+  if (settled) figure.line(*settled, distances ? 0 : -most, *settled, most, "mean");
   for (std::size_t i = 1; i < time_s.size(); ++i)
     figure.line(time_s[i - 1], displacement_px[i - 1], time_s[i], displacement_px[i], kColors[0]);
   return figure.standalone();
