@@ -405,6 +405,8 @@ typedef struct lh_solved_target {
   int32_t photos;             /**< that show it */
   double rms_px;
   double world_from_body[12]; /**< 3 x 4, metres, where placed */
+  int32_t part;               /**< which part of the photographs it was solved with; 0: the placed one; -1: none */
+  double part_from_body[12];  /**< as world_from_body, in the frame of its part, where part >= 0 */
 } lh_solved_target;
 
 /** Targets, or boards of targets; 0 for NULL. */
@@ -423,6 +425,23 @@ LH_API lh_status lh_target_model_name(lh_context *ctx, const lh_target_model *mo
  */
 LH_API lh_status lh_target_model_points(lh_context *ctx, const lh_target_model *model, size_t i, int32_t *names,
                                         double *xyz, double *covariance, size_t n);
+
+typedef struct lh_solved_photo {
+  size_t struct_size;
+  int32_t camera;           /**< which of the capture's cameras */
+  int32_t part;             /**< parts are joined by no target; 0: the placed one; -1: it has no pose */
+  int32_t in_model;         /**< yes: the targets' model was made from it; no: placed by the model, then adjusted with all */
+  double cam_from_part[12]; /**< 3 x 4, metres, where part >= 0; of part 0: cam_from_world */
+} lh_solved_photo;
+
+/** Photographs that were there when the capture was calibrated; 0 for NULL. */
+LH_API size_t lh_target_model_photo_count(const lh_target_model *model);
+LH_API lh_status lh_target_model_photo(lh_context *ctx, const lh_target_model *model, size_t i, lh_solved_photo *out);
+LH_API lh_status lh_target_model_photo_name(lh_context *ctx, const lh_target_model *model, size_t i, char *buffer,
+                                            size_t size, size_t *needed);
+/** Why it makes the model, or need not, or has no pose. */
+LH_API lh_status lh_target_model_photo_reason(lh_context *ctx, const lh_target_model *model, size_t i, char *buffer,
+                                              size_t size, size_t *needed);
 
 /** How well a photograph's pose is known. covariance: 6 x 6, of (rotation vector, translation) of a small motion applied
  *  after cam_from_world: rad, metres. covariance, points, rms_px: each may be NULL.

@@ -416,7 +416,17 @@ typedef struct lh_camera_functions {
 /** A robot of the application's own. functions is copied; `user` must outlive the robot. */
 LH_API lh_status lh_robot_create(lh_context *ctx, const lh_robot_functions *functions, lh_robot **out);
 LH_API lh_status lh_camera_device_create(lh_context *ctx, const lh_camera_functions *functions, lh_camera_device **out);
-/** By a word: robots "turntable" or "hand", cameras "hand": the session's operator is asked to do it. */
+/**
+ * By a word, as `lumihull capture` takes them. The device is opened by each session or dry run that uses it, and closed
+ * when that ends; then its errors are told, too: LH_ENOTFOUND, LH_EIO.
+ *
+ * Robots: "simulate", which only takes its time; "turntable" and "hand", the session's operator is asked to do it;
+ * "serial:PORT", the winches of the plan's mechanism. Cameras: "simulate", small pictures of a pattern; "hand";
+ * "serial:PORT", or "serial" at the robot's own port; "gphoto2", "gphoto2:PORT"; "folder:DIR", where another program
+ * leaves files. What is simulated remembers in FOLDER.simulated, beside the session's folder.
+ *
+ * @return LH_EINVAL: no such word
+ */
 LH_API lh_status lh_robot_by_word(lh_context *ctx, const char *word, lh_robot **out);
 LH_API lh_status lh_camera_device_by_word(lh_context *ctx, const char *word, lh_camera_device **out);
 /** Opens a port for this process alone, e.g. "/dev/ttyUSB0". baud: 0: 57600. @return LH_ENOTFOUND, LH_EIO */
@@ -485,6 +495,57 @@ LH_API lh_status lh_session_dry_run(lh_context *ctx, const lh_plan *plan, lh_rob
 LH_API lh_status lh_session_run(lh_context *ctx, const lh_plan *plan, lh_robot *robot, lh_camera_device *const *cameras,
                                 size_t n, const char *folder, const lh_session_options *options, const lh_operator *who,
                                 lh_session_result *result);
+
+typedef struct lh_card_options {
+  size_t struct_size;
+  const char *camera;    /**< whose card it is, by its name in the plan; NULL: the only camera */
+  int32_t clock_known;   /**< yes: clock_offset_s holds to half a minute; else it is found */
+  double clock_offset_s; /**< the camera's clock less UTC */
+  int32_t again;         /**< yes: shots without a picture are to be photographed again */
+  int32_t dry_run;       /**< yes: nothing is done, only told */
+  void *user;
+  void (*tell)(void *user, const char *line); /**< what is found, a line each; NULL: nobody listens */
+} lh_card_options;
+
+typedef struct lh_card_result {
+  size_t struct_size;
+  size_t matched;   /**< pictures of shots that had not landed before */
+  size_t landed;    /**< of these, by this call */
+  size_t missing;   /**< shots that were taken, without a picture */
+  size_t extra;     /**< pictures of no shot */
+  size_t ambiguous; /**< places that fit in more than one way; left out */
+  size_t troubles;  /**< pictures that could not be landed; `tell` says why */
+} lh_card_result;
+
+/** Pictures of a memory card to the shots of a session's journal. The card is only read, nothing is overwritten.
+ *  @param card   the folder of the pictures, or of a copy of them
+ *  @param result NULL, or what became of it
+ *  @return LH_ENOTFOUND, LH_EINPUT: no journal, a damaged one; LH_EIO: disk, another process at work here */
+LH_API lh_status lh_card_land(lh_context *ctx, const char *folder, const char *card, const lh_card_options *options,
+                              lh_card_result *result);
+
+/* ---- experiments on the robot --------------------------------------------------------------------------------------
+ */
+
+/** How well the robot came back, of a calibrated capture whose plan visits places several times: {"places": [{"name",
+ *  "photographs", "distances_m", "angles_rad", …}], "largest_distance_m", "largest_angle_rad", "rms_distance_m",
+ *  "rms_angle_rad", "measured_m", …}: distances and angles of measured poses to their place's mean.
+ *  @return LH_EINPUT: no scale, or no place with two measured visits */
+LH_API lh_status lh_repeatability(lh_context *ctx, const lh_capture *capture, char *buffer, size_t size,
+                                  size_t *needed);
+/** n poses of 3 x 4; their mean, and how far each is from it: (n) m, (n) rad. Any of the three may be NULL. */
+LH_API lh_status lh_pose_spread(lh_context *ctx, const double *world_from_camera, size_t n, double mean[12],
+                                double *distance_m, double *angle_rad);
+/** When a target in a film stays within allowed_px of where it rests, which is the mean of the last rest_s seconds.
+ *  @param time_s      (n), ascending
+ *  @param center_px   (n x 2)
+ *  @param allowed_px  0: 0.5
+ *  @param rest_s      0: 2
+ *  @param distance_px NULL, or (n) from where it rests
+ *  @param settle_s    NULL, or the first time of these; -1: it was not within at the end
+ *  @param rest_px     NULL, or the RMS distance over the rest */
+LH_API lh_status lh_stability(lh_context *ctx, const double *time_s, const double *center_px, size_t n,
+                              double allowed_px, double rest_s, double *distance_px, double *settle_s, double *rest_px);
 
 #ifdef __cplusplus
 }

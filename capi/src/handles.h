@@ -85,10 +85,11 @@ struct lh_serial_link {
 };
 
 struct lh_robot {
-  std::unique_ptr<lumihull::capture::Robot> device;  ///< none: a person, by `word`
+  std::unique_ptr<lumihull::capture::Robot> device;  ///< none: by `word`
   std::string word;
 };
 
 struct lh_camera_device {
-  std::unique_ptr<lumihull::capture::CameraDevice> device;  ///< none: a person
+  std::unique_ptr<lumihull::capture::CameraDevice> device;  ///< none: by `word`
+  std::string word;
 };

@@ -1,4 +1,4 @@
-#include <lumihull/capture/operator_robot.h>
+#include <lumihull/capture/devices.h>
 #include <lumihull/capture/serial.h>
 #include <lumihull/capture/session.h>
 
@@ -166,21 +166,22 @@ capture::SessionOptions options_from(const lh_session_options& o) {
   return options;
 }
 
-/// The devices of a session; those that a person works are made for its operator.
-class Devices {
+/// The devices of a session: the application's own, and those that words tell, which are open as long as it lasts.
+class SessionDevices {
  public:
-  Devices(lh_robot* robot, lh_camera_device* const* cameras, size_t n, capture::Operator& who) {
+  SessionDevices(lh_robot* robot, lh_camera_device* const* cameras, size_t n, const capture::Plan& plan,
+                 const std::filesystem::path& folder, capture::Operator& who, Job& job)
+      : by_word_(folder, who) {
     robot_ = given(robot, "robot").device.get();
     if (!robot_) {
-      if (robot->word == "hand")
-        own_robot_ = std::make_unique<capture::HandRobot>(who);
-      else
-        own_robot_ = std::make_unique<capture::TurntableRobot>(who);
+      own_robot_ = by_word_.robot(robot->word, plan);
       robot_ = own_robot_.get();
     }
     for (lh_camera_device* camera : array(cameras, n, 1, "cameras")) {
       capture::CameraDevice* device = given(camera, "cameras").device.get();
-      if (!device) device = own_cameras_.emplace_back(std::make_unique<capture::OperatorCamera>(who)).get();
+      const std::size_t i = cameras_.size();
+      const std::string name = i < plan.cameras.size() ? plan.cameras[i] : "camera " + std::to_string(i + 1);
+      if (!device) device = own_cameras_.emplace_back(by_word_.camera(camera->word, name, *robot_, job)).get();
       cameras_.push_back(device);
     }
   }
@@ -188,6 +189,7 @@ class Devices {
   std::span<capture::CameraDevice* const> cameras() const { return cameras_; }
 
  private:
+  capture::Devices by_word_;
   capture::Robot* robot_;
   std::unique_ptr<capture::Robot> own_robot_;
   std::vector<std::unique_ptr<capture::CameraDevice>> own_cameras_;
@@ -210,26 +212,25 @@ lh_status lh_camera_device_create(lh_context* ctx, const lh_camera_functions* us
     given(out, "out");
     const lh_camera_functions functions = read_struct(&given(user, "functions"), "functions");
     if (!functions.shoot) invalid("expected a function `shoot`", "functions");
-    give(out, std::make_unique<OwnCamera>(functions));
+    give(out, std::make_unique<OwnCamera>(functions), "");
   });
 }
 
 lh_status lh_robot_by_word(lh_context* ctx, const char* word, lh_robot** out) {
   return guarded(ctx, [&] {
     given(out, "out");
-    const std::string_view w = text(word, "word");
-    if (w != "turntable" && w != "hand")
-      invalid("expected \"turntable\" or \"hand\", found \"" + std::string(w) + "\"", "word");
-    give(out, nullptr, word);
+    const std::string w(text(word, "word"));
+    capture::check_robot_word(w);
+    give(out, nullptr, w);
   });
 }
 
 lh_status lh_camera_device_by_word(lh_context* ctx, const char* word, lh_camera_device** out) {
   return guarded(ctx, [&] {
     given(out, "out");
-    const std::string_view w = text(word, "word");
-    if (w != "hand") invalid("expected \"hand\", found \"" + std::string(w) + "\"", "word");
-    give(out, nullptr);
+    const std::string w(text(word, "word"));
+    capture::check_camera_word(w);
+    give(out, nullptr, w);
   });
 }
 
@@ -255,7 +256,7 @@ lh_status lh_robot_serial(lh_context* ctx, const lh_serial_link* link, const lh_
 lh_status lh_camera_device_serial(lh_context* ctx, const lh_serial_link* link, lh_camera_device** out) {
   return guarded(ctx, [&] {
     given(out, "out");
-    give(out, capture::open_serial_camera(given(link, "link").value));
+    give(out, capture::open_serial_camera(given(link, "link").value), "");
   });
 }
 
@@ -265,12 +266,13 @@ void lh_camera_device_destroy(lh_camera_device* camera) { delete camera; }
 lh_status lh_session_dry_run(lh_context* ctx, const lh_plan* plan, lh_robot* robot, lh_camera_device* const* cameras,
                              size_t n, const char* folder, const lh_session_options* user, char* buffer, size_t size,
                              size_t* needed) {
-  return guarded(ctx, [&] {
+  return guarded(ctx, [&](Job& job) {
     const lh_session_options o = read_struct(user, "options");
     capture::AbsentOperator nobody(o.agree_to_motion);
-    Devices devices(robot, cameras, n, nobody);
-    const capture::DryRun found = capture::dry_run(given(plan, "plan").value.plan, devices.robot(), devices.cameras(),
-                                                   path(folder, "folder"), options_from(o));
+    const capture::Plan& p = given(plan, "plan").value.plan;
+    const std::filesystem::path place = path(folder, "folder");
+    SessionDevices devices(robot, cameras, n, p, place, nobody, job);
+    const capture::DryRun found = capture::dry_run(p, devices.robot(), devices.cameras(), place, options_from(o));
     nlohmann::ordered_json json;
     json["problems"] = found.problems;
     json["notes"] = found.notes;
@@ -287,10 +289,11 @@ lh_status lh_session_run(lh_context* ctx, const lh_plan* plan, lh_robot* robot, 
     const lh_session_options o = read_struct(user, "options");
     const auto person = operator_from(who, o.agree_to_motion);
     if (result) checked_struct_size(result->struct_size, "result");
-    Devices devices(robot, cameras, n, *person);
+    const capture::Plan& p = given(plan, "plan").value.plan;
+    const std::filesystem::path place = path(folder, "folder");
+    SessionDevices devices(robot, cameras, n, p, place, *person, job);
     const capture::SessionResult r =
-        capture::capture(given(plan, "plan").value.plan, devices.robot(), devices.cameras(), path(folder, "folder"),
-                         options_from(o), *person, job);
+        capture::capture(p, devices.robot(), devices.cameras(), place, options_from(o), *person, job);
     lh_session_result value{};
     value.views = r.views, value.of = r.of;
     value.taken = r.taken, value.awaited = r.awaited;

@@ -17,6 +17,10 @@ const calib::CalibratedBody& body(const lh_target_model* model, size_t i) {
   return bodies[index(i, bodies.size(), "i")];
 }
 
+size_t photo(const lh_target_model* model, size_t i) {
+  return index(i, given(model, "model").value.photos.size(), "i");
+}
+
 }  // namespace
 
 lh_status lh_target_model_open(lh_context* ctx, const lh_capture* capture, lh_target_model** out) {
@@ -73,6 +77,8 @@ lh_status lh_target_model_get(lh_context* ctx, const lh_target_model* model, siz
     value.photos = b.photos;
     value.rms_px = b.rms_px;
     pose_to(b.body.world_from_body, value.world_from_body);
+    value.part = b.part;
+    if (b.part_from_body) pose_to(*b.part_from_body, value.part_from_body);
     write_struct(out, value, "out");
   });
 }
@@ -101,6 +107,32 @@ lh_status lh_target_model_points(lh_context* ctx, const lh_target_model* model, 
         covariance[9 * k + size_t(r)] = b.placed ? b.point_covariances[k](r / 3, r % 3) : kNaN;
     }
   });
+}
+
+size_t lh_target_model_photo_count(const lh_target_model* model) { return model ? model->value.photos.size() : 0; }
+
+lh_status lh_target_model_photo(lh_context* ctx, const lh_target_model* model, size_t i, lh_solved_photo* out) {
+  return guarded(ctx, [&] {
+    const size_t k = photo(model, i);
+    const calib::CalibratedPhoto& p = model->value.calibration.photos.at(k);
+    lh_solved_photo value{};
+    value.camera = model->value.photos[k].camera;
+    value.part = p.part;
+    value.in_model = p.in_model;
+    if (p.cam_from_part) pose_to(*p.cam_from_part, value.cam_from_part);
+    write_struct(out, value, "out");
+  });
+}
+
+lh_status lh_target_model_photo_name(lh_context* ctx, const lh_target_model* model, size_t i, char* buffer, size_t size,
+                                     size_t* needed) {
+  return guarded(ctx, [&] { give_text(model->value.photos[photo(model, i)].name, buffer, size, needed); });
+}
+
+lh_status lh_target_model_photo_reason(lh_context* ctx, const lh_target_model* model, size_t i, char* buffer,
+                                       size_t size, size_t* needed) {
+  return guarded(
+      ctx, [&] { give_text(model->value.calibration.photos.at(photo(model, i)).reason, buffer, size, needed); });
 }
 
 lh_status lh_capture_pose_quality(lh_context* ctx, const lh_capture* capture, size_t shot, double covariance[36],

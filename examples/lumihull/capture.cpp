@@ -3,6 +3,7 @@
 
 #include <lumihull/base/error.h>
 #include <lumihull/calib/lens_calibration.h>
+#include <lumihull/capture/devices.h>
 #include <lumihull/capture/session.h>
 
 #include <algorithm>
@@ -10,8 +11,8 @@
 #include <filesystem>
 #include <iostream>
 
-#include "capture_devices.h"
 #include "program.h"
+#include "terminal_operator.h"
 
 namespace lumihull::program {
 
@@ -77,13 +78,13 @@ void run(Program& program, Arguments& a) {
   for (const std::string& word : a.cameras) options.devices += " " + word;
 
   TerminalOperator who([&](const std::string& line) { program.say(line); }, a.yes, program.job());
-  Devices devices(a.folder, who, program.job());
+  capture::Devices devices(a.folder, who);
   const auto robot = devices.robot(a.robot, plan);
   std::vector<std::unique_ptr<capture::CameraDevice>> owned;
   std::vector<capture::CameraDevice*> cameras;
   for (std::size_t i = 0; i < a.cameras.size(); ++i) {
     const std::string name = i < plan.cameras.size() ? plan.cameras[i] : "camera " + std::to_string(i + 1);
-    owned.push_back(devices.camera(a.cameras[i], name, *robot));
+    owned.push_back(devices.camera(a.cameras[i], name, *robot, program.job()));
     cameras.push_back(owned.back().get());
   }
   if (a.dry_run) return say_dry_run(program, capture::dry_run(plan, *robot, cameras, a.folder, options));

@@ -39,7 +39,7 @@ std::vector<int> count_reasons(const Detections& found) {
 
 void detect(Program& program, const Arguments& a) {
   Job& job = program.job();
-  calib::DetectOptions options;
+  calib::DetectOptions options{};
   if (!a.ink_key.empty()) options.ink_key = calib::ColorKey::load(a.ink_key, job);
   const calib::TargetDetector detector(calib::TargetSet::from_text(a.targets), options);
   std::vector<std::string> drawings;

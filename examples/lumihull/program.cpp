@@ -138,6 +138,9 @@ int Program::run(int argc, char** argv) {
   add_detect(*this);
   add_ingest(*this);
   add_plan(*this);
+  add_experiments(*this);
+  add_simulate(*this);
+  add_demo(*this);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -97,5 +97,8 @@ void add_targets(Program& program);
 void add_detect(Program& program);
 void add_ingest(Program& program);
 void add_plan(Program& program);
+void add_experiments(Program& program);  // repeatability, stability
+void add_simulate(Program& program);
+void add_demo(Program& program);
 
 }  // namespace lumihull::program

@@ -53,9 +53,16 @@ std::string frame_name(std::size_t i) {
 }
 
 Eigen::Vector3d up_axis(std::span<const View> views) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const View& view : views) sum -= view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitY();
-  return sum.norm() > 1e-6 * double(views.size()) ? Eigen::Vector3d(sum.normalized()) : Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d up = Eigen::Vector3d::Zero(), across = up, out = up;
+  for (const View& view : views) {
+    const Eigen::Quaterniond world_from_cam = view.cam_from_world.rotation.conjugate();
+    up -= world_from_cam * Eigen::Vector3d::UnitY();
+    across += world_from_cam * Eigen::Vector3d::UnitX();
+    out -= world_from_cam * Eigen::Vector3d::UnitZ();
+  }
+  // Of portrait pictures the longer side is upright; which way round, that cameras look down on things tells.
+  if (across.norm() > 2 * up.norm()) up = across.dot(out) < 0 ? Eigen::Vector3d(-across) : across;
+  return up.norm() > 1e-6 * double(views.size()) ? Eigen::Vector3d(up.normalized()) : Eigen::Vector3d::UnitZ();
 }
 
 std::vector<PathView> turntable(const hull::Mesh& mesh, std::span<const View> photographs,

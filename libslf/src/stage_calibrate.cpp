@@ -191,7 +191,9 @@ const StageDefinition& calibrate_stage() {
            0,
            0,
            {"rigid", "bending", "free"}},
-          {"model_photos", "photographs that the targets' model is made from, the others are placed by it; 0: all",
+          {"model_photos",
+           "photographs that the targets' model is made from; the others are placed by it and join the last "
+           "adjustment; 0: all",
            std::int64_t(kSolve.model_photos), 0, 1e6},
           {"outlier_sigma", "points farther off than so many standard deviations are removed", kSolve.outlier_sigma, 2,
            100},

@@ -3,19 +3,23 @@
 //
 //     bench_room FOLDER [--photos 600]             makes FOLDER/0001.jpg …; those that are there stay
 //     bench_room FOLDER --judge CAPTURE            poses, focal length, points and covariances against the truth
+//     bench_room FOLDER --measure 50               circles in so many of the photographs, against where they should be
 
 #include <lumihull/base/error.h>
 #include <lumihull/base/image.h>
 #include <lumihull/base/job.h>
 #include <lumihull/base/parallel.h>
 #include <lumihull/calib/circle_projection.h>
+#include <lumihull/calib/detect_targets.h>
 #include <lumihull/calib/target_model.h>
 #include <lumihull/rig/flat_print.h>
 
 #include <CLI/CLI.hpp>
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -238,20 +242,77 @@ void judge(const fs::path& folder) {
               c.sigma0, 1e3 * c.cross_validation_m, c.cross_validation_sigma, c.verdict.c_str());
 }
 
+/// What is measured less what is true, by the circles' size: its mean would be in every photograph alike.
+void measure(const fs::path& folder, int photos, int looked_at, unsigned threads) {
+  const Room room = make_room();
+  const calib::TargetDesign& design = room.set.designs[0];
+  struct Sum {
+    double x = 0, y = 0, outward = 0, squares = 0, chi = 0;
+    std::size_t n = 0;
+  };
+  constexpr std::array<double, 7> kSizes{0, 8, 11, 15, 20, 28, 40};
+  std::array<Sum, kSizes.size()> sums{};
+  const calib::TargetDetector detector(room.set, {});
+  Job job({}, threads);
+  for (int k = 0; k < looked_at; ++k) {
+    const int i = int(std::int64_t(k) * photos / looked_at);
+    char name[16];
+    std::snprintf(name, sizeof name, "%04d.jpg", i + 1);
+    const View view{room.camera, pose_of(i, photos)};
+    for (const calib::Detection& d : detector.detect(read_image(folder / name), job).targets) {
+      const auto at = std::find(room.ids.begin(), room.ids.end(), d.id);
+      if (at == room.ids.end()) continue;
+      const Pose cam_from_target = view.cam_from_world * room.world_from_target[std::size_t(at - room.ids.begin())];
+      const auto middle = view.camera.project(cam_from_target.translation);
+      for (const calib::Feature& f : d.features) {
+        const Vector2d p = design.feature(f.index);
+        calib::Circle3 circle;
+        circle.center = cam_from_target * Vector3d(p.x(), p.y(), 0);
+        circle.u = cam_from_target.rotation * Vector3d::UnitX(),
+        circle.v = cam_from_target.rotation * Vector3d::UnitY();
+        circle.radius = design.circle_radius_m();
+        const auto pixel = calib::projected_circle_center(view.camera, circle);
+        if (!pixel || !middle) continue;
+        const Vector2d e = f.pixel - *pixel, out = *pixel - *middle;
+        if (e.norm() > 1) continue;
+        const Eigen::Matrix2d axes = f.pixel * f.pixel.transpose() - f.dual_conic.topLeftCorner<2, 2>();
+        const double size =
+            2 * std::sqrt(std::max(0., Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(axes).eigenvalues()[0]));
+        std::size_t bin = kSizes.size() - 1;
+        while (size < kSizes[bin]) --bin;
+        Sum& sum = sums[bin];
+        sum.x += e.x(), sum.y += e.y(), sum.squares += e.squaredNorm(), ++sum.n;
+        if (out.norm() > size) sum.outward += e.dot(out.normalized());
+        sum.chi += e.dot(f.covariance.ldlt().solve(e)) / 2;
+      }
+    }
+  }
+  for (std::size_t k = 0; k < sums.size(); ++k)
+    if (const Sum& s = sums[k]; s.n > 0)
+      std::printf(
+          "circles from %2.0f px: %6zu, mean %8.5f %8.5f px, away from the target's middle %8.5f, RMS %.5f, chi2 / 2 "
+          "%.2f\n",
+          kSizes[k], s.n, s.x / double(s.n), s.y / double(s.n), s.outward / double(s.n),
+          std::sqrt(s.squares / double(s.n)), s.chi / double(s.n));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   fs::path folder, capture;
-  int photos = 600;
+  int photos = 600, looked_at = 0;
   unsigned threads = 0;
   CLI::App app("A session of photographs in an enclosure: made, and its calibration judged");
   app.add_option("folder", folder, "where the photographs are kept")->required();
   app.add_option("--photos", photos, "how many are made")->capture_default_str()->check(CLI::Range(1, 9999));
   app.add_option("--judge", capture, "a calibrated capture of them");
+  app.add_option("--measure", looked_at, "look at so many of the photographs, and compare")->check(CLI::Range(1, 9999));
   app.add_option("--threads", threads, "0: one for each core")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {
-    if (capture.empty())
+    if (looked_at > 0)
+      measure(folder, photos, looked_at, threads);
+    else if (capture.empty())
       make(folder, photos, threads);
     else
       judge(capture);

@@ -22,6 +22,7 @@ int main(int argc, char **argv) {
   lh_target_model *model = NULL;
   lh_calibration figures;
   lh_solved_target target;
+  lh_solved_photo photo;
   const double eye[3] = {1, 1, 2}, middle[3] = {0, 0, 0}, up[3] = {0, 0, 1};
   double pose[12], xyz[3 * kPoints], covariance[100], quality[36];
   int32_t names[3 * kPoints];
@@ -82,6 +83,22 @@ int main(int argc, char **argv) {
   CHECK(isnan(xyz[0]));
   EXPECT(ctx, LH_EINVAL, lh_target_model_points(ctx, model, 1, names, xyz, NULL, kPoints - 1));
   EXPECT(ctx, LH_EINVAL, lh_target_model_get(ctx, model, 3, &target));
+  CHECK(target.part == 0 && memcmp(target.part_from_body, target.world_from_body, sizeof target.part_from_body) == 0);
+
+  CHECK(lh_target_model_photo_count(model) == kPhotos && lh_target_model_photo_count(NULL) == 0);
+  memset(&photo, 0, sizeof photo);
+  photo.struct_size = sizeof photo;
+  MUST(ctx, lh_target_model_photo(ctx, model, 3, &photo));
+  CHECK(photo.camera == 1 && photo.part == 0 && photo.in_model == 1);
+  CHECK(fabs(photo.cam_from_part[3] - pose[3]) < 1e-12 && fabs(photo.cam_from_part[11] - pose[11]) < 1e-12);
+  MUST(ctx, lh_target_model_photo(ctx, model, 2, &photo));
+  CHECK(photo.part == -1 && photo.in_model == 0);
+  MUST(ctx, lh_target_model_photo_name(ctx, model, 2, text, sizeof text, &needed));
+  CHECK(strcmp(text, "p2") == 0);
+  MUST(ctx, lh_target_model_photo_reason(ctx, model, 2, text, sizeof text, &needed));
+  CHECK(strcmp(text, "shows no target") == 0);
+  EXPECT(ctx, LH_EINVAL, lh_target_model_photo(ctx, model, kPhotos, &photo));
+  EXPECT(ctx, LH_EINVAL, lh_target_model_photo_reason(ctx, NULL, 0, text, sizeof text, &needed));
   EXPECT(ctx, LH_EINVAL, lh_target_model_calibration(ctx, NULL, &figures));
 
   EXPECT(ctx, LH_ENOTFOUND, lh_capture_pose_quality(ctx, capture, 0, quality, NULL, NULL));

@@ -37,7 +37,7 @@ Kills run_killed(test::Scene& scene, int kills, double longest_s, std::uint32_t 
     if (child == 0) {
       int status = 1;
       try {
-        scene.prepare = [&](rig::SimulatedRobot& robot, const std::vector<rig::SimulatedCamera*>&) {
+        scene.prepare = [&](capture::SimulatedRobot& robot, const std::vector<capture::SimulatedCamera*>&) {
           robot.on_move = [&](const PlannedStop&) { (void)!write(moved[1], "m", 1); };
         };
         scene.who.answers[About::doubt] = {"again"};
@@ -158,7 +158,7 @@ TEST(KilledAt, EachStepOfAShot) {
       scene.recalls = recalls;
       const pid_t child = fork();
       if (child == 0) {
-        scene.prepare = [&](rig::SimulatedRobot& robot, const std::vector<rig::SimulatedCamera*>& cameras) {
+        scene.prepare = [&](capture::SimulatedRobot& robot, const std::vector<capture::SimulatedCamera*>& cameras) {
           const auto die_at = [](ShotId id) {
             if (id == 6) raise(SIGKILL);
           };

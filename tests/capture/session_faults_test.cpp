@@ -94,7 +94,7 @@ TEST(SessionFaults, AnUnpluggedPortStopsTheSessionSafely) {
   const test::TemporaryFolder folder;
   test::Scene scene(folder.path(), test::turntable_plan(5));
   bool unplugged = true;
-  scene.prepare = [&](rig::SimulatedRobot& robot, auto&) {
+  scene.prepare = [&](capture::SimulatedRobot& robot, auto&) {
     robot.on_move = [&](const PlannedStop& stop) {
       if (unplugged && stop.name == "a003-e00") throw Error(ErrorCode::io, "the port is gone", "/dev/ttyUSB0");
     };
@@ -152,8 +152,8 @@ TEST(SessionFaults, WithoutAnOperatorADoubtStopsWithAClearWord) {
   const test::TemporaryFolder folder;
   test::Scene scene(folder.path(), test::turntable_plan(3));
   const Plan plan = scene.plan;
-  rig::SimulatedRobot robot({.time_scale = 1, .memory = {}});
-  rig::SimulatedCamera camera({.list = folder / "list", .recalls = false, .card = {}}, &robot);
+  capture::SimulatedRobot robot({.time_scale = 1, .memory = {}});
+  capture::SimulatedCamera camera({.list = folder / "list", .recalls = false, .card = {}}, &robot);
   camera.instead = [](ShotId) { return outcome(ShotState::unknown, "the link broke"); };
   CameraDevice* cameras[] = {&camera};
   Job job;
@@ -342,7 +342,7 @@ TEST(SessionFaults, OneProcessAtATime) {
   const test::TemporaryFolder folder;
   test::Scene scene(folder.path(), test::turntable_plan(3));
   std::optional<Error> second;
-  scene.prepare = [&](rig::SimulatedRobot& robot, auto&) {
+  scene.prepare = [&](capture::SimulatedRobot& robot, auto&) {
     robot.on_move = [&](const PlannedStop& stop) {
       if (stop.name != "a001-e00") return;
       test::Scene other(folder.path(), test::turntable_plan(3));
@@ -369,7 +369,7 @@ TEST(SessionFaults, CancelledWhileSettlingAndWhileExposing) {
   test::Scene scene(folder.path(), test::turntable_plan(4));
   Job job;
   scene.options.settle_s = 3000;
-  scene.prepare = [&](rig::SimulatedRobot& robot, auto&) { robot.on_roll = [&](double) { job.cancel(); }; };
+  scene.prepare = [&](capture::SimulatedRobot& robot, auto&) { robot.on_roll = [&](double) { job.cancel(); }; };
   EXPECT_EQ(test::expect_error([&] { scene.run(&job); }).code(), ErrorCode::cancelled);
   EXPECT_TRUE(scene.ended_safe);
   EXPECT_EQ(scene.state().last, EventKind::stopped);

@@ -93,26 +93,26 @@ Scene::Scene(const fs::path& place, Plan p) : folder(place / "object"), memory(p
 
 SessionResult Scene::run(Job* job) {
   Job own;
-  rig::SimulatedRobot robot({.time_scale = 1,
-                             .turn_s = 0.001,
-                             .memory = robot_remembers ? memory / "robot" : fs::path(),
-                             .starts_anywhere = !plan.mechanism});
+  capture::SimulatedRobot robot({.time_scale = 1,
+                                 .turn_s = 0.001,
+                                 .memory = robot_remembers ? memory / "robot" : fs::path(),
+                                 .starts_anywhere = !plan.mechanism});
   robot.on_move = [&](const PlannedStop& stop) {
     moves.push_back(stop.name);
     ways.push_back(stop);
   };
-  std::vector<std::unique_ptr<rig::SimulatedCamera>> cameras;
-  std::vector<rig::SimulatedCamera*> simulated;
+  std::vector<std::unique_ptr<capture::SimulatedCamera>> cameras;
+  std::vector<capture::SimulatedCamera*> simulated;
   std::vector<CameraDevice*> devices;
   for (const std::string& name : plan.cameras) {
-    cameras.push_back(
-        std::make_unique<rig::SimulatedCamera>(rig::SimulatedCamera::Options{.name = name,
-                                                                             .list = memory / ("exposures-" + name),
-                                                                             .recalls = recalls,
-                                                                             .delivers = delivers,
-                                                                             .card = memory / "card",
-                                                                             .time_scale = 1},
-                                               &robot));
+    cameras.push_back(std::make_unique<capture::SimulatedCamera>(
+        capture::SimulatedCamera::Options{.name = name,
+                                          .list = memory / ("exposures-" + name),
+                                          .recalls = recalls,
+                                          .delivers = delivers,
+                                          .card = memory / "card",
+                                          .time_scale = 1},
+        &robot));
     simulated.push_back(cameras.back().get());
     devices.push_back(cameras.back().get());
   }
@@ -120,8 +120,8 @@ SessionResult Scene::run(Job* job) {
   ended_safe = false;
   struct End {
     Scene& scene;
-    rig::SimulatedRobot& robot;
-    std::vector<rig::SimulatedCamera*>& cameras;
+    capture::SimulatedRobot& robot;
+    std::vector<capture::SimulatedCamera*>& cameras;
     ~End() {
       scene.ended_safe = !robot.motors_on();
       for (const auto* camera : cameras) scene.ended_safe &= !camera->ready();

@@ -3,7 +3,7 @@
 // A capture with simulated devices, for tests.
 
 #include <lumihull/capture/session.h>
-#include <lumihull/rig/simulated_devices.h>
+#include <lumihull/capture/simulated_devices.h>
 
 #include <deque>
 #include <filesystem>
@@ -39,7 +39,7 @@ struct Scene {
   capture::SessionOptions options;
   ScriptedOperator who;
   bool recalls = true, delivers = true, robot_remembers = true;
-  std::function<void(rig::SimulatedRobot&, const std::vector<rig::SimulatedCamera*>&)> prepare;  ///< faults
+  std::function<void(capture::SimulatedRobot&, const std::vector<capture::SimulatedCamera*>&)> prepare;  ///< faults
   std::vector<std::string> moves;  ///< every place that the robot was sent to, over all sessions
   std::vector<capture::PlannedStop> ways;
   bool ended_safe = false;  ///< motors off, cameras released, after the latest session

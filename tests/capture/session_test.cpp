@@ -196,7 +196,7 @@ TEST(Session, TheCameraIsTurnedWhereThePlanTurnsIt) {
   plan.stops.insert(plan.stops.begin() + 4, turning);
   test::Scene scene(folder.path(), plan);
   std::vector<std::string> record;
-  scene.prepare = [&](rig::SimulatedRobot& robot, auto&) {
+  scene.prepare = [&](capture::SimulatedRobot& robot, auto&) {
     robot.on_roll = [&](double roll) { record.push_back(robot.stop() + (roll > 1 ? " portrait" : " landscape")); };
   };
   scene.who.answers[About::position] = {plan.stops[0].name};
@@ -267,7 +267,7 @@ TEST(Session, WhoTurnsATableByHandIsAskedForEachStop) {
   const test::TemporaryFolder folder;
   const Plan plan = test::turntable_plan(4);
   test::ScriptedOperator who;
-  TurntableRobot robot(who);
+  OperatorRobot robot(OperatorRobot::Moves::turntable, who);
   OperatorCamera camera(who);
   CameraDevice* cameras[] = {&camera};
   Job job;
@@ -279,7 +279,7 @@ TEST(Session, WhoTurnsATableByHandIsAskedForEachStop) {
   ASSERT_EQ(tasks.size(), 9u);  // hold the camera; then turn and press, four times
   EXPECT_THAT(tasks[3], HasSubstr("turn the table to 90.0°"));
   EXPECT_THAT(tasks[4], HasSubstr("press the shutter"));
-  HandRobot hand(who);
+  OperatorRobot hand(OperatorRobot::Moves::camera, who);
   hand.move_to(plan.stops[1], job);
   EXPECT_THAT(who.asked.back().text, HasSubstr("move the camera to x 0.00, y 1.00, z 0.40 m"));
   who.answers[About::task] = {"stop"};

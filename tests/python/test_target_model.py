@@ -38,6 +38,11 @@ def test_reads_the_model(capture: lumihull.Capture) -> None:
     features = model.features(1)
     assert features.shape == (25, 3) and (features[:, 1] == 1).all() and (features[:, 2] == range(25)).all()
     assert model.pose(0) is not None and model.pose(-1) is None and model.points(2).shape == (0, 3)
+    assert [model.part(i) for i in range(3)] == [0, 0, -1]
+    assert model.pose_in_part(0) is not None and model.pose_in_part(2) is None
+    photos = model.photos
+    assert [p["part"] for p in photos] == [0, 0, -1, 0] and photos[2]["reason"] == "shows no target"
+    assert photos[3]["in_model"] and photos[3]["cam_from_part"] is not None and photos[2]["cam_from_part"] is None
     figures = model.describe()
     assert figures["photos"] == 4 and figures["photos_placed"] == 2 and figures["targets"] == 2
     assert figures["removed"][0]["why"] == "outlier"

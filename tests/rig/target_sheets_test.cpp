@@ -99,7 +99,7 @@ TEST(TargetSheets, StandBehindTheObjectAndChangeNothingElse) {
 TEST(TargetSheets, RefusesWhatCantBeHung) {
   const HungRoom room;
   for (const TargetSheetOptions& o :
-       {TargetSheetOptions{.circle_px = 0}, TargetSheetOptions{.circle_px = NAN}, TargetSheetOptions{.spacing = 1}})
+       {TargetSheetOptions{.circle_px = 0}, TargetSheetOptions{.circle_px = NAN}, TargetSheetOptions{.density = 1}})
     EXPECT_THROW(scatter_targets(room.scene, room.camera, 1, o), Error);
   EXPECT_THROW(scatter_targets(room.scene, room.camera, NAN, {}), Error);
   EXPECT_THROW(scatter_targets(room.scene, room.camera, 1, {.circle_px = 1}), Error);  // more sheets than ids

@@ -50,6 +50,23 @@ TEST(CameraPath, ATurntableGoesAroundTheObject) {
   EXPECT_TRUE(slf::turntable(mesh, photographs, options)[0].view.cam_from_world.rotation.coeffs().allFinite());
 }
 
+TEST(CameraPath, UpOfPortraitPicturesIsAlongTheirLongerSide) {
+  const Eigen::Vector3d up = Eigen::Vector3d(.3, -.2, 1).normalized();
+  const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up);
+  for (const double roll : {0., .5, -.5}) {  // landscape, portrait either way; half turns
+    std::vector<View> views;
+    for (int i = 0; i < 24; ++i) {
+      // From above to level, all around, held a little askew.
+      const double azimuth = 2.4 * i, polar = .3 + .05 * i, askew = .06 * std::sin(5. * i);
+      const Eigen::Vector3d eye(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar));
+      Pose pose = look_at(turn * eye, Eigen::Vector3d::Zero(), up);
+      pose.rotation = Eigen::AngleAxisd(roll * 3.14159265358979 + askew, Eigen::Vector3d::UnitZ()) * pose.rotation;
+      views.push_back({camera(60, 40, 50), pose});
+    }
+    EXPECT_GT(slf::up_axis(views).dot(up), std::cos(.03)) << roll;
+  }
+}
+
 TEST(CameraPath, FilesComeBackAsTheyWere) {
   const test::TemporaryFolder folder;
   Camera bent = camera(123, 77, 99.5);

@@ -42,6 +42,7 @@ from ._lumihull import Renderer as Renderer
 from ._lumihull import Rendering as Rendering
 from ._lumihull import Resection as Resection
 from ._lumihull import Sensitivity as Sensitivity
+from ._lumihull import Session as Session
 from ._lumihull import StageResult as StageResult
 from ._lumihull import Stop as Stop
 from ._lumihull import TargetDesign as TargetDesign
@@ -65,13 +66,17 @@ from ._lumihull import import_middlebury as import_middlebury
 from ._lumihull import import_nerf as import_nerf
 from ._lumihull import import_photos as import_photos
 from ._lumihull import import_projections as import_projections
+from ._lumihull import land_card as land_card
 from ._lumihull import plan_hemisphere as plan_hemisphere
+from ._lumihull import pose_spread as pose_spread
 from ._lumihull import psnr as psnr
 from ._lumihull import read_image as read_image
 from ._lumihull import read_mesh as read_mesh
+from ._lumihull import repeatability as repeatability
 from ._lumihull import resect as resect
 from ._lumihull import silhouette_iou as silhouette_iou
 from ._lumihull import ssim as ssim
+from ._lumihull import stability as stability
 from ._lumihull import stage_names as stage_names
 from ._lumihull import stage_options as stage_options
 from ._lumihull import standing_object as standing_object

@@ -634,6 +634,10 @@ class TargetModel:
     @property
     def names(self) -> list[str]: ...
     def pose(self, target: int) -> Optional[Pose]: ...
+    def part(self, target: int) -> int: ...
+    def pose_in_part(self, target: int) -> Optional[Pose]: ...
+    @property
+    def photos(self) -> list[dict[str, Any]]: ...
     def features(self, target: int) -> NDArray[np.int32]: ...
     def points(self, target: int) -> NDArray[np.float64]: ...
     def covariances(self, target: int) -> NDArray[np.float64]: ...
@@ -896,3 +900,45 @@ def plan_hemisphere(
     progress: _OnProgress = None,
     threads: int = 0,
 ) -> Plan: ...
+
+class Session:
+    def __init__(
+        self,
+        plan: Plan,
+        folder: _Path,
+        robot: Union[str, object],
+        cameras: Sequence[Union[str, object]],
+        *,
+        names: str = "{stop}-{camera}",
+        settle_s: Optional[float] = None,
+        exposure_s: Optional[float] = None,
+        retries: int = 2,
+        retake: str = "",
+        pause_after: int = 0,
+        intrinsics: dict[str, Camera] = ...,
+        agree_to_motion: bool = False,
+    ) -> None: ...
+    def dry_run(self) -> dict[str, Any]: ...
+    def run(
+        self,
+        ask: Optional[Callable[[str, str, list[str]], str]] = None,
+        tell: Optional[Callable[[str], object]] = None,
+        progress: _OnProgress = None,
+    ) -> dict[str, Any]: ...
+
+def land_card(
+    folder: _Path,
+    card: _Path,
+    *,
+    camera: str = "",
+    clock_offset_s: Optional[float] = None,
+    again: bool = False,
+    dry_run: bool = False,
+    tell: Optional[Callable[[str], object]] = None,
+    progress: _OnProgress = None,
+) -> dict[str, Any]: ...
+def repeatability(capture: Capture) -> dict[str, Any]: ...
+def pose_spread(world_from_camera: Sequence[Pose]) -> tuple[Pose, NDArray[np.float64], NDArray[np.float64]]: ...
+def stability(
+    time_s: ArrayLike, center_px: ArrayLike, allowed_px: float = 0.5, rest_s: float = 2.0
+) -> dict[str, Any]: ...

@@ -34,6 +34,7 @@ void bind_lens(py::module_& module);
 void bind_target_model(py::module_& module);
 void bind_mechanism(py::module_& module);
 void bind_plan(py::module_& module);
+void bind_session(py::module_& module);
 
 [[noreturn]] inline void invalid(const std::string& message, const char* argument) {
   throw Error(ErrorCode::invalid_argument, message, argument);

@@ -176,4 +176,5 @@ PYBIND11_MODULE(_lumihull, module) {
   python::bind_target_model(module);
   python::bind_mechanism(module);
   python::bind_plan(module);
+  python::bind_session(module);
 }

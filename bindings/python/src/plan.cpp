@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "bindings.h"
+#include "planned.h"
 
 namespace lumihull::python {
 
@@ -17,12 +18,6 @@ using namespace py::literals;
 using namespace lumihull::capture;
 
 namespace {
-
-/// A plan with what planning told about it.
-struct Planned {
-  PlannedTour tour;
-  PoseLimits limits;
-};
 
 Eigen::Vector3d point_from(const Array<double>& array, const char* name) {
   if (array.ndim() != 1 || array.shape(0) != 3) invalid("expected three numbers", name);

@@ -57,6 +57,25 @@ void bind_target_model(py::module_& module) {
           },
           "target"_a, "world_from_body, or None where it could not be placed.")
       .def(
+          "part", [](const TargetModel& m, py::ssize_t i) { return body(m, i).part; }, "target"_a,
+          "Which part of the photographs it was solved with, for parts share no target; 0: the placed one; -1: none.")
+      .def(
+          "pose_in_part", [](const TargetModel& m, py::ssize_t i) { return body(m, i).part_from_body; }, "target"_a,
+          "part_from_body, in the frame of its part; None without one.")
+      .def_property_readonly(
+          "photos",
+          [](const TargetModel& m) {
+            py::list photos;
+            for (std::size_t i = 0; i < m.photos.size(); ++i) {
+              const calib::CalibratedPhoto& p = m.calibration.photos.at(i);
+              photos.append(py::dict("name"_a = m.photos[i].name, "camera"_a = m.photos[i].camera, "part"_a = p.part,
+                                     "cam_from_part"_a = p.cam_from_part, "in_model"_a = p.in_model,
+                                     "reason"_a = p.reason));
+            }
+            return photos;
+          },
+          "A dictionary a photograph: name, camera, part (-1: no pose), cam_from_part, in_model, reason.")
+      .def(
           "features",
           [](const TargetModel& m, py::ssize_t i) {
             const calib::CalibratedBody& b = body(m, i);

@@ -16,6 +16,7 @@
 #include "noise.h"
 #include "sheets.h"
 #include "shutter.h"
+#include "thin_lines.h"
 
 namespace lumihull::rig {
 
@@ -290,6 +291,7 @@ Photo Photographer::photograph(const View& view, const PhotoOptions& options, st
   }
   add_sheets(scene, view, Shutter(view, options, during, center_depth), options.blur_px, exposure.cover, exposure.light,
              job);
+  add_lines(scene, view, options.lines, options.blur_px, exposure.light);
   Photo photo;
   photo.picture = develop(exposure.light, options, mix(seed), job);
   photo.mask = converted(exposure.cover, PixelType::u8, 1);

@@ -8,13 +8,13 @@
 #include <utility>
 
 #include "noise.h"
+#include "scattering.h"
 
 namespace lumihull::rig {
 
 namespace {
 
 using Eigen::Matrix3d;
-using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846;
@@ -41,25 +41,44 @@ class Scatter {
       design.validate();
       out_.set.designs.push_back(design);
     }
-    ids_ = out_.set.designs[0].family.ids();
   }
 
+  /// Darts that stay where there is room, until the sheets cover their share.
   RoomTargets run() {
-    walls();
-    const double r = scene_.enclosure.radius, near = .26 * r, middle = .6 * r;
-    floor(kSmall, clear_of_object(), near);
-    floor(kMedium, near, middle);
-    floor(kLarge, middle, r);
-    out_.set.validate();
+    const Enclosure& room = scene_.enclosure;
+    const double r = room.radius, near = .26 * r, middle = .6 * r, foot = clear_of_object();
+    const double half = r * std::tan(kPi / room.panels);
+    const auto wall = [&] {
+      const int panel = std::min(room.panels - 1, int(.5 * (random() + 1) * room.panels));
+      const double angle = 2 * kPi * (panel + .5) / room.panels, u = half * random();
+      const Eigen::Vector3f out(float(std::cos(angle)), float(std::sin(angle)), 0), across(-out.y(), out.x(), 0);
+      RoomHit hit;
+      hit.surface = Room::kPanels + panel;
+      hit.point = room.radius * out + float(u) * across + Eigen::Vector3f(0, 0, .5f * (float(random()) + 1) * room.height);
+      hit.normal = -out;
+      return hit;
+    };
+    scatter(kLarge, 2 * half * room.panels * room.height, wall);
+    const auto ring = [&](double from, double to) {
+      return [this, from, to] {
+        const double at = std::sqrt(from * from + .5 * (random() + 1) * (to * to - from * from)), turn = kPi * random();
+        RoomHit hit;
+        hit.surface = Room::kFloor;
+        hit.point = {float(at * std::cos(turn)), float(at * std::sin(turn)), 0};
+        return hit;
+      };
+    };
+    const auto floor = [&](Size size, double from, double to) {
+      if (to > from) scatter(size, kPi * (to * to - from * from), ring(from, to));
+    };
+    floor(kSmall, foot, near);
+    floor(kMedium, std::max(foot, near), middle);
+    floor(kLarge, std::max(foot, middle), r);
+    if (!out_.placed.empty()) out_.set.validate();
     return std::move(out_);
   }
 
  private:
-  double width(Size size) const {
-    const calib::TargetDesign& design = out_.set.designs[size];
-    return (design.family.grid() + 1) * design.size_m;
-  }
-
   double clear_of_object() const {
     double foot = scene_.enclosure.pedestal_radius;
     for (const Object& object : scene_.objects)
@@ -69,83 +88,96 @@ class Scatter {
 
   double random() { return 2 * unit_double(mix(mix(options_.seed, 0x5ee7), draws_++)) - 1; }
 
-  /// A sheet whose middle is at `at`; x, y: the directions of the print before it is turned a little.
-  void place(Size size, const Vector3d& at, const Vector3d& x, const Vector3d& y, const char* where) {
-    if (out_.placed.size() >= ids_.size())
-      throw Error(ErrorCode::invalid_argument, "more sheets than ids: choose a larger spacing or larger circles",
-                  "targets");
-    Matrix3d axes;
-    axes << x, y, x.cross(y);
-    const int id = ids_[out_.placed.size()];
-    const Pose world_from_target =
-        Pose::from_matrix(axes * Eigen::AngleAxisd(kAskew * random(), Vector3d::UnitZ()).toRotationMatrix(), at);
-    FlatPrint print = print_of(out_.set.designs[size], id);
-    print.world_from_print = world_from_target;
-    out_.prints.push_back(std::move(print));
-    out_.placed.push_back({size, id, world_from_target});
-    char name[32];
-    std::snprintf(name, sizeof name, "%s-%04d", where, id);
-    out_.set.boards.push_back({name, {{size, id, Pose{}}}});
-  }
-
-  /// Middles of cells of a grid over [0, length], each with what is left to move within it.
-  struct Cells {
-    int n;
-    double step, play;
-    Cells(double length, double sheet, double spacing)
-        : n(std::max(0, int(length / (spacing * sheet)))), step(n > 0 ? length / n : 0) {
-      // A turned square needs cos + sin of its width.
-      play = std::max(0., .5 * (step - sheet * (std::cos(kAskew) + std::sin(kAskew))));
+  template <class Dart>
+  void scatter(Size size, double area_m2, const Dart& dart) {
+    const double w = sheet_width(out_.set.designs[size]);
+    const int wanted = int(std::min(1e6, options_.density * area_m2 / (w * w) + .5 * (random() + 1)));
+    constexpr int kPatience = 40;  // darts a sheet; beyond that the surface is full
+    for (int hung = 0, thrown = 0; hung < wanted && thrown < kPatience * wanted; ++thrown) {
+      const RoomHit hit = dart();
+      const auto pose = free_place(out_, scene_, size, hit, random());
+      if (!pose) continue;
+      hang(out_, size, *pose, hit.surface == Room::kFloor ? "floor" : "wall");
+      ++hung;
     }
-  };
-
-  void walls() {
-    const Enclosure& room = scene_.enclosure;
-    const double half = room.radius * std::tan(kPi / room.panels), w = width(kLarge);
-    const Cells across(2 * half, w, options_.spacing), up(room.height, w, options_.spacing);
-    for (int panel = 0; panel < room.panels; ++panel) {
-      const double angle = 2 * kPi * (panel + .5) / room.panels;
-      const Vector3d out(std::cos(angle), std::sin(angle), 0), y(0, 0, -1), x = y.cross(out);
-      for (int i = 0; i < across.n; ++i)
-        for (int j = 0; j < up.n; ++j) {
-          const double u = (i + .5) * across.step - half + across.play * random();
-          const double v = (j + .5) * up.step + up.play * random();
-          place(kLarge, room.radius * out + u * x + Vector3d(0, 0, v), x, y, "wall");
-        }
-    }
-  }
-
-  /// The ring of the floor between two radii about the axis.
-  void floor(Size size, double from, double to) {
-    const double w = width(size), reach = w / std::sqrt(2.);  // a sheet's corner from its middle
-    const Cells cells(2 * to, w, options_.spacing);
-    for (int i = 0; i < cells.n; ++i)
-      for (int j = 0; j < cells.n; ++j) {
-        const Vector2d at((i + .5) * cells.step - to + cells.play * random(),
-                          (j + .5) * cells.step - to + cells.play * random());
-        if (at.norm() < from + reach || at.norm() > to - reach) continue;
-        // From above the print's z, into the paper, is down.
-        const double turn = kPi * random();
-        const Vector3d x(std::cos(turn), std::sin(turn), 0), y(std::sin(turn), -std::cos(turn), 0);
-        place(size, {at.x(), at.y(), 0}, x, y, "floor");
-      }
   }
 
   const Scene& scene_;
   const TargetSheetOptions& options_;
   RoomTargets out_;
-  std::span<const int> ids_;
   std::uint64_t draws_ = 0;
 };
 
+/// Whether two squares in one plane overlap, or leave less than a twentieth of a width between them (separating axes).
+bool overlap(const Pose& a, double width_a, const Pose& b, double width_b) {
+  const Matrix3d axes_a = a.rotation.toRotationMatrix(), axes_b = b.rotation.toRotationMatrix();
+  const Vector3d apart = b.translation - a.translation;
+  if (axes_a.col(2).dot(axes_b.col(2)) < .9 || std::fabs(axes_a.col(2).dot(apart)) > .01) return false;
+  const double gap = .05 * std::min(width_a, width_b);
+  const auto reach = [](const Matrix3d& axes, double width, const Vector3d& along) {
+    return .5 * width * (std::fabs(axes.col(0).dot(along)) + std::fabs(axes.col(1).dot(along)));
+  };
+  for (const Matrix3d* axes : {&axes_a, &axes_b})
+    for (int k = 0; k < 2; ++k) {
+      const Vector3d along = axes->col(k);
+      if (std::fabs(apart.dot(along)) > reach(axes_a, width_a, along) + reach(axes_b, width_b, along) + gap) return false;
+    }
+  return true;
+}
+
 }  // namespace
+
+double sheet_width(const calib::TargetDesign& design) { return (design.family.grid() + 1) * design.size_m; }
+
+void hang(RoomTargets& targets, int design, const Pose& world_from_target, const char* where) {
+  const calib::TargetDesign& as_printed = targets.set.designs[std::size_t(design)];
+  const std::span<const int> ids = as_printed.family.ids();
+  if (targets.placed.size() >= ids.size())
+    throw Error(ErrorCode::invalid_argument, "more sheets than ids: choose fewer or larger ones",
+                "targets");
+  const int id = ids[targets.placed.size()];
+  FlatPrint print = print_of(as_printed, id);
+  print.world_from_print = world_from_target;
+  targets.prints.push_back(std::move(print));
+  targets.placed.push_back({design, id, world_from_target});
+  char name[32];
+  std::snprintf(name, sizeof name, "%s-%04d", where, id);
+  targets.set.boards.push_back({name, {{design, id, Pose{}}}});
+}
+
+std::optional<Pose> free_place(const RoomTargets& targets, const Scene& scene, int design, const RoomHit& at,
+                               double askew) {
+  const Enclosure& room = scene.enclosure;
+  const double width = sheet_width(targets.set.designs[std::size_t(design)]);
+  const Vector3d place = at.point.cast<double>();
+  Matrix3d axes;
+  if (at.surface == Room::kFloor) {
+    const double turn = kPi * askew, reach = width / std::sqrt(2.);  // of a corner
+    axes << Vector3d(std::cos(turn), std::sin(turn), 0), Vector3d(std::sin(turn), -std::cos(turn), 0),
+        -Vector3d::UnitZ();
+    if (place.head<2>().norm() < room.pedestal_radius + reach || place.head<2>().norm() > room.radius - reach)
+      return std::nullopt;
+  } else {
+    const double turn = kAskew * askew, reach = .5 * width * (std::cos(turn) + std::fabs(std::sin(turn)));
+    const Vector3d out = -at.normal.cast<double>(), y(0, 0, -1), x = y.cross(out);
+    const double across = x.dot(place), half = room.radius * std::tan(kPi / room.panels);
+    if (std::fabs(across) > half - reach || place.z() < reach || place.z() > room.height - reach) return std::nullopt;
+    axes << x, y, out;
+    axes = axes * Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix();
+  }
+  const Pose pose = Pose::from_matrix(axes, place);
+  for (const PlacedTarget& other : targets.placed)
+    if (overlap(pose, width, other.world_from_target, sheet_width(targets.set.designs[std::size_t(other.design)])))
+      return std::nullopt;
+  return pose;
+}
 
 RoomTargets scatter_targets(const Scene& scene, const Camera& camera, double distance,
                             const TargetSheetOptions& options) {
-  if (!(options.circle_px >= 1 && options.circle_px <= 1000) || !(options.spacing >= 1.5 && options.spacing <= 100) ||
+  if (!(options.circle_px >= 1 && options.circle_px <= 1000) || !(options.density > 0 && options.density <= .4) ||
       !(std::isfinite(distance) && distance > 0))
     throw Error(ErrorCode::invalid_argument,
-                "expected circles of 1 to 1000 px, a spacing of 1.5 to 100 and a positive distance", "targets");
+                "expected circles of 1 to 1000 px, a density of at most 0.4 and a positive distance", "targets");
   camera.validate();
   return Scatter(scene, camera, distance, options).run();
 }

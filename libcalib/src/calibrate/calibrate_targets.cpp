@@ -1,4 +1,5 @@
-// From detections to poses: start, growth, adjustments with data snooping, the rest by resection, figures.
+// From detections to poses: start, growth, adjustments with data snooping, the rest by resection, all of them together,
+// figures.
 #include <lumihull/base/error.h>
 #include <lumihull/base/parallel.h>
 #include <lumihull/calib/calibrate.h>
@@ -7,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numeric>
 
@@ -179,9 +181,9 @@ void clean(Network& n, int part, CalibrateOptions& options, Job& job) {
 }
 
 /// A photograph beyond the model: the pose that its points and the model's agree on. factor: how much larger variances
-/// are than the detections' own, as the adjustment found.
-void place_rest(Network& n, const CalibrateOptions& options, double factor, std::vector<CalibratedPhoto>& photos,
-                Job& job) {
+/// are than the detections' own, as the adjustment found. True where one got a place.
+bool place_rest(Network& n, const CalibrateOptions& options, double factor, Job& job) {
+  std::atomic<bool> placed = false;
   parallel_for(job, n.photos.size(), [&](std::size_t i) {
     if (n.in_model[i] || n.by_photo[i].empty() || n.photo_part[i] >= 0 || !place_photo(n, int(i), 0)) return;
     std::vector<PointMatch> matches;
@@ -199,19 +201,32 @@ void place_rest(Network& n, const CalibrateOptions& options, double factor, std:
     try {
       const Resection r = resect(n.camera_of(int(i)), matches, resect_options);
       n.cam_from_world[i] = r.cam_from_world;
-      photos[i].covariance = r.covariance;
       for (const std::uint32_t k : r.outliers) n.seen[seen[k]].counts = false;
       for (const int s : n.by_photo[i]) {
         Sighting& sighting = n.sightings[std::size_t(s)];
         sighting.counts =
             std::any_of(sighting.seen.begin(), sighting.seen.end(), [&](std::uint32_t k) { return n.seen[k].counts; });
       }
+      placed = true;
     } catch (const Error& e) {
       if (e.code() != ErrorCode::degenerate) throw;
       n.cam_from_world[i].reset();
       n.photo_part[i] = -1;
     }
   });
+  return placed;
+}
+
+/// Part 0 adjusted and judged until nothing changes, by the photographs that n.in_model has.
+std::optional<Settled> settle_finally(Network& n, SettleOptions options, double outlier_sigma, Job& job) {
+  std::optional<Settled> settled;
+  for (int round = 0; round < 5; ++round) {
+    options.as_points = round == 0;
+    settled = settle(n, 0, n.in_model, options, job);
+    double scale = 1;
+    if (!settled || (judge(n, 0, outlier_sigma, &scale) == 0 && round > 0)) break;
+  }
+  return settled;
 }
 
 /// A frame of the world that people would choose: a sheet's or table's, z up from it; else that of the body that is
@@ -361,19 +376,19 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
   last.free_print_scale = options.free_print_scale;
   last.rig = options.rig;
   last.max_iterations = 50;
-  std::optional<Settled> settled;
-  for (int round = 0; round < 5; ++round) {
-    last.covariances = false;
-    last.as_points = round == 0;
-    settled = settle(n, 0, n.in_model, last, job);
-    double scale = 1;
-    if (!settled || (judge(n, 0, options.outlier_sigma, &scale) == 0 && round > 0)) break;
+  std::optional<Settled> settled = settle_finally(n, last, options.outlier_sigma, job);
+  // Placed photographs join the adjustment, and bring the targets that only they show: their poses' covariances then
+  // know of the lens's and the targets' too, and these gain by what the photographs saw.
+  const double variance = settled ? std::max(1.0, settled->result.sigma0 * settled->result.sigma0) : 1;
+  if (settled && place_rest(n, options, variance, job)) {
+    n.in_model.assign(photos.size(), true);
+    grow_on(n, 0, job, [] {});
+    settled = settle_finally(n, last, options.outlier_sigma, job);
   }
   double flatness = 0;
   turn_world(n, 0, chosen_frame(n, 0, &flatness));
   c.bend_m = flatness;
   last.covariances = true;
-  last.as_points = false;
   settled = settle(n, 0, n.in_model, last, job);
   if (!settled) throw Error(ErrorCode::degenerate, "too few points are left to place any photograph", "targets");
 
@@ -383,7 +398,6 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
   c.sigma0 = result.sigma0;
   c.print_scale = result.adjusted.print_scale;
   const double factor = std::max(1.0, c.sigma0 * c.sigma0);
-  place_rest(n, options, factor, c.photos, job);
   c.cameras = n.cameras;
   c.cam_from_rig = settled->cam_from_rig;
   for (const auto& covariance : result.camera_covariances) c.camera_covariances.push_back(covariance * factor);
@@ -392,8 +406,9 @@ Calibration calibrate_targets(const TargetSet& set, std::span<const PhotoTargets
     photo.part = n.photo_part[i];
     photo.cam_from_part = n.cam_from_world[i];
     if (photo.part == 0) photo.cam_from_world = photo.cam_from_part;
-    photo.in_model = settled->shot_of_photo[i] >= 0;
-    if (photo.in_model) photo.covariance = result.shot_covariances[std::size_t(settled->shot_of_photo[i])] * factor;
+    const bool adjusted = settled->shot_of_photo[i] >= 0;
+    photo.in_model = adjusted && model.use[i];
+    if (adjusted) photo.covariance = result.shot_covariances[std::size_t(settled->shot_of_photo[i])] * factor;
   }
   name_what_was_left_out(n, 0);
   name_unplaced_photos(n, 0, c.photos);

@@ -109,7 +109,7 @@ ModelPhotos choose_model_photos(const Network& n, int most) {
   }
   for (const int i : candidates)
     if (!chosen.use[std::size_t(i)])
-      chosen.reason[std::size_t(i)] = "the model has enough views like this one; placed by resection";
+      chosen.reason[std::size_t(i)] = "the model has enough views like this one; placed by resection, then adjusted with all";
   return chosen;
 }
 

@@ -14,13 +14,14 @@ constexpr float kReach = 4.6f;    // of the Gaussian, in units of s: 2e-6 are be
 
 }  // namespace
 
-void BlurredEllipse::set(const Eigen::Vector2d& center, const Eigen::Matrix2d& root, double s, double inner_ratio) {
+void BlurredEllipse::set(const Eigen::Vector2d& center, const Eigen::Matrix2d& root, double s, double inner_ratio,
+                         const Eigen::Vector2d& inner_offset) {
   nodes_.clear();
   groups_.clear();
   s_ = s;
   ring_ = inner_ratio > 0;
   add_contour(center, root, 1, 1);
-  if (ring_) add_contour(center, root, inner_ratio, -1);
+  if (ring_) add_contour(center + inner_offset, root, inner_ratio, -1);
 }
 
 void BlurredEllipse::add_contour(const Eigen::Vector2d& center, const Eigen::Matrix2d& root, double ratio,

@@ -37,8 +37,9 @@ class BlurredEllipse {
   };
 
   /// The contour is center + root u, u on the unit circle; center: about an origin of the caller's. inner_ratio > 0: a
-  /// ring.
-  void set(const Eigen::Vector2d& center, const Eigen::Matrix2d& root, double s, double inner_ratio);
+  /// ring, whose inner contour's centre is inner_offset off.
+  void set(const Eigen::Vector2d& center, const Eigen::Matrix2d& root, double s, double inner_ratio,
+           const Eigen::Vector2d& inner_offset = {0, 0});
   void evaluate(const Pixels& pixels, Share& share) const;
   /// w alone, in a third of the time.
   Lanes covered(const Pixels& pixels) const;

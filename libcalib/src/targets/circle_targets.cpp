@@ -96,11 +96,13 @@ bool can_be(const EllipseFit& fit, const Ellipse& guess) {
          2.5 * e.a * e.b >= guess.a * guess.b;
 }
 
-// Measures the circles whose state is good; predicted: where the others say that they are. A spot may be larger than
+// Measures the circles whose state is good; predicted: where the others say that they are; inner_offsets: of a ring's
+// inner contour's centre, should it be one. A spot may be larger than
 // its circle, where the threshold is close to the paper.
 Contours measure(const LightPlane& plane, std::span<const Ellipse> circles,
-                 std::span<const std::optional<Ellipse>> predicted, std::span<const EllipseState> states,
-                 const CellReading& first, const CircleLook& look, const DetectOptions& options) {
+                 std::span<const std::optional<Ellipse>> predicted, std::span<const Vector2d> inner_offsets,
+                 std::span<const EllipseState> states, const CellReading& first, const CircleLook& look,
+                 const DetectOptions& options) {
   Contours contours;
   contours.fits.resize(circles.size());
   const double blur = std::sqrt(std::max(0.0, first.blur_px * first.blur_px - 1.0 / 12));  // without the pixel's
@@ -109,6 +111,7 @@ Contours measure(const LightPlane& plane, std::span<const Ellipse> circles,
     const Ellipse& guess = circles[i];
     EllipseOptions fit_options = options.ellipse;
     fit_options.inner_ratio = first.cells[i] == Cell::light && !look.solid_light ? look.ring_ratio : 0;
+    fit_options.inner_offset = inner_offsets[i];
     EllipseFit& fit = contours.fits[i];
     fit = options.refine ? fit_ellipse(plane, guess, fit_options, blur) : dual_conic_fit(plane, guess, fit_options);
     if (fit.state != EllipseState::good) continue;
@@ -296,8 +299,12 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   // Measure; a first reading says which circles are rings.
   std::vector<Ellipse> circles(n);
   std::vector<std::optional<Ellipse>> predicted(n);
+  std::vector<Vector2d> inner_offsets(n, Vector2d(0, 0));
   std::vector<EllipseState> states(n, EllipseState::no_fit);
   for (std::size_t i = 0; i < n; ++i) {
+    const Vector2d offset =
+        homography_circle_center(h, points[i], design.ring_radius_m()) - homography_circle_center(h, points[i], radius);
+    if (offset.allFinite()) inner_offsets[i] = offset;
     predicted[i] = seen_circle(h, points[i], radius);
     if (window.blob[i] >= 0)
       circles[i] = ellipse_of(blobs[std::size_t(window.blob[i])]);
@@ -309,7 +316,7 @@ WindowResult read_window(const LightPlane& plane, std::span<const Blob> blobs, c
   }
   const CircleLook look = look_of(design);
   const CellReading first = read_cells(plane, circles, states, grid, 2 * grid - 1, look);
-  const Contours contours = measure(plane, circles, predicted, states, first, look, options);
+  const Contours contours = measure(plane, circles, predicted, inner_offsets, states, first, look, options);
   const std::vector<EllipseFit>& fits = contours.fits;
   const int good = contours.good;
   std::vector<EllipseState> readable(n);

@@ -33,7 +33,7 @@ constexpr double kFeetMoved = 0.01;  // px that a contour moves before its neare
 }  // namespace
 
 void ContourFit::gather(const Ellipse& ellipse, const ContourModel& model, const BandWidth& band, int sectors,
-                        double inner_ratio, bool rough) {
+                        double inner_ratio, const Eigen::Vector2d& inner_offset, bool rough) {
   blocks_.clear();
   // As many as there will be, nearly: they are large.
   const double wide = band.inward + band.outward, about = 2 * std::numbers::pi * ellipse.a * wide;
@@ -43,6 +43,7 @@ void ContourFit::gather(const Ellipse& ellipse, const ContourModel& model, const
   longest_ = ellipse.a;
   gathered_ = 0;
   inner_ratio_ = inner_ratio;
+  inner_offset_ = inner_offset;
   const double s = model.p[ContourModel::blur], ratio = inner_ratio > 0 ? model.p[ContourModel::ratio] : 1;
   const double outer_curvature = s * ellipse.a / (ellipse.b * ellipse.b);
   curvature_ = outer_curvature / ratio;
@@ -118,11 +119,11 @@ void ContourFit::gather(const Ellipse& ellipse, const ContourModel& model, const
 void ContourFit::set(const ContourModel& model) {
   const double s = model.p[ContourModel::blur], ratio = model.p[ContourModel::ratio];
   if (!quick_) {
-    exact_.set(model.center(), model.root(), s, inner_ratio_ > 0 ? ratio : 0);
+    exact_.set(model.center(), model.root(), s, inner_ratio_ > 0 ? ratio : 0, inner_offset_);
     return;
   }
   outer_.set(model.center(), model.root(), s, 1, false);
-  if (inner_ratio_ > 0) inner_.set(model.center(), model.root(), s, ratio, true);
+  if (inner_ratio_ > 0) inner_.set(model.center() + inner_offset_, model.root(), s, ratio, true);
 }
 
 bool ContourFit::corrected(const ContourModel& model) const {
@@ -138,7 +139,7 @@ void ContourFit::for_each_residual(const ContourModel& model, Body&& body) {
   correct_next_ = false;
   if (correcting) {
     exact_.set(model.center(), model.root(), model.p[ContourModel::blur],
-               inner_ratio_ > 0 ? model.p[ContourModel::ratio] : 0);
+               inner_ratio_ > 0 ? model.p[ContourModel::ratio] : 0, inner_offset_);
     corrected_at_ = model;
   }
   const bool follow = quick_ && (model.p - feet_at_.p).head<ContourModel::root22 + 1>().norm() > kFeetMoved;

@@ -59,10 +59,10 @@ class ContourFit {
       : plane_(plane), origin_(origin), unit_(unit), sum_(sum) {}
 
   /// Takes the pixels of the band about a model's contour; `sectors` parts of the contour, equal in the ellipse's own
-  /// angle. inner_ratio: 0, or what is expected of a ring's. rough: for an answer that is but a start, so a quick sum is
-  /// only corrected where it is far off.
+  /// angle. inner_ratio: 0, or what is expected of a ring's; inner_offset: of its contour's centre. rough: for an
+  /// answer that is but a start, so a quick sum is only corrected where it is far off.
   void gather(const Ellipse& ellipse, const ContourModel& model, const BandWidth& band, int sectors, double inner_ratio,
-              bool rough);
+              const Eigen::Vector2d& inner_offset, bool rough);
   /// What the model expects of each pixel, for weigh, measure_sectors and robust_scale; solve leaves its answer's.
   void expect(const ContourModel& model);
   /// Weights of the pixels by the expected values; clipped ones (by value or by what is expected) and those of sectors
@@ -134,6 +134,7 @@ class ContourFit {
   ContourModel corrected_at_, feet_at_;
   double curvature_ = 0;    // the largest κ s
   double inner_ratio_ = 0;  // 0: no ring
+  Eigen::Vector2d inner_offset_{0, 0};
   double squares_ = 0, jitter_px_ = 0, noise_scale_ = 1;
   int pixels_ = 0, clipped_ = 0, gathered_ = 0;
   ContourModel::Matrix information_ = ContourModel::Matrix::Zero();

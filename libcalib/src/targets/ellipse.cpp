@@ -53,6 +53,7 @@ void EllipseOptions::validate() const {
   need(max_saturated >= 0 && max_saturated <= 1, "max_saturated must be 0 to 1");
   need(min_contrast_noise >= 0 && std::isfinite(min_contrast_noise), "min_contrast_noise must be 0 or more");
   need(inner_ratio >= 0 && inner_ratio <= 0.9, "inner_ratio must be 0 to 0.9");
+  need(inner_offset.allFinite(), "inner_offset must be finite");
 }
 
 }  // namespace lumihull::calib

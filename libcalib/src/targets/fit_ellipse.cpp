@@ -160,7 +160,7 @@ EllipseFit fit_from(const LightPlane& plane, const EllipseFit& start, const Elli
   bool ring = false;
   for (int round = 0; round < 2; ++round) {
     const BandWidth band = band_of(model.p[ContourModel::blur], ellipse.b, options.inner_ratio, round > 0, ring);
-    pixels.gather(ellipse, model, band, sectors, ring ? options.inner_ratio : 0, round == 0);
+    pixels.gather(ellipse, model, band, sectors, ring ? options.inner_ratio : 0, options.inner_offset, round == 0);
     if (pixels.gathered() < 2 * ContourModel::kSize) return fit;
     if (!fit_band(pixels, model, start_noise, effort, round > 0)) {
       fit.visible = visible_share(pixels.sectors(), ellipse);

@@ -23,48 +23,41 @@ std::string text(const char* format, double a, double b = 0, double c = 0) {
   return out;
 }
 
-void ask_for_roll(Operator& who, double roll_rad, Job& job) {
+std::string turn_of(const PlannedStop& stop) {
+  double degrees = std::fmod(stop.theta_rad * kDegrees, 360.0);
+  if (degrees < 0) degrees += 360;
+  return text(": turn the table to %.1f°, the camera at %.1f° above the horizon", degrees,
+              90 - stop.phi_rad * kDegrees);
+}
+
+std::string place_of(const PlannedStop& stop) {
+  const Eigen::Vector3d at = stop.cam_from_world.center();
+  return text(": move the camera to x %.2f, y %.2f, z %.2f m", at.x(), at.y(), at.z()) +
+         text(" (azimuth %.1f°, %.1f° above the horizon), aimed at the object", stop.theta_rad * kDegrees,
+              90 - stop.phi_rad * kDegrees);
+}
+
+}  // namespace
+
+/// A person always knows where things are.
+Robot::State OperatorRobot::state() {
+  State state;
+  state.ready = state.position_known = true;
+  return state;
+}
+
+void OperatorRobot::move_to(const PlannedStop& stop, Job& job) {
+  ask_for(who_, stop.name + (moves_ == Moves::turntable ? turn_of(stop) : place_of(stop)), job);
+}
+
+void OperatorRobot::set_roll(double roll_rad, Job& job) {
   const double degrees = roll_rad * kDegrees;
-  ask_for(who,
+  ask_for(who_,
           std::abs(degrees) < 0.05        ? "hold the camera in landscape"
           : std::abs(degrees - 90) < 0.05 ? "hold the camera in portrait"
                                           : text("turn the camera about its axis to %.1f°", degrees),
           job);
 }
-
-/// A person always knows where things are.
-Robot::State ready_by_hand() {
-  Robot::State state;
-  state.ready = state.position_known = true;
-  return state;
-}
-
-}  // namespace
-
-Robot::State TurntableRobot::state() { return ready_by_hand(); }
-Robot::State HandRobot::state() { return ready_by_hand(); }
-
-void TurntableRobot::move_to(const PlannedStop& stop, Job& job) {
-  double degrees = std::fmod(stop.theta_rad * kDegrees, 360.0);
-  if (degrees < 0) degrees += 360;
-  ask_for(who_,
-          stop.name + text(": turn the table to %.1f°, the camera at %.1f° above the horizon", degrees,
-                           90 - stop.phi_rad * kDegrees),
-          job);
-}
-
-void TurntableRobot::set_roll(double roll_rad, Job& job) { ask_for_roll(who_, roll_rad, job); }
-
-void HandRobot::move_to(const PlannedStop& stop, Job& job) {
-  const Eigen::Vector3d at = stop.cam_from_world.center();
-  ask_for(who_,
-          stop.name + text(": move the camera to x %.2f, y %.2f, z %.2f m", at.x(), at.y(), at.z()) +
-              text(" (azimuth %.1f°, %.1f° above the horizon), aimed at the object", stop.theta_rad * kDegrees,
-                   90 - stop.phi_rad * kDegrees),
-          job);
-}
-
-void HandRobot::set_roll(double roll_rad, Job& job) { ask_for_roll(who_, roll_rad, job); }
 
 ShotOutcome OperatorCamera::shoot(ShotId id, double, const std::filesystem::path&, Job& job) {
   const std::string answer = who_.ask({Question::About::task,

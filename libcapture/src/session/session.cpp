@@ -334,7 +334,10 @@ class Session {
 
   void visit(std::size_t stop) {
     go_to(stop);
-    wait(settle_s(plan_.stops[stop]), job_);
+    if (options_.settle)
+      options_.settle(settle_s(plan_.stops[stop]), job_);
+    else
+      wait(settle_s(plan_.stops[stop]), job_);
     for (std::size_t c = 0; c < cameras() && !result_.paused; ++c) {
       if (!wanted(stop * cameras() + c)) continue;
       take(stop, c);

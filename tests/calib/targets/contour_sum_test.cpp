@@ -103,7 +103,7 @@ TEST(ContourFit, QuickAnswersAreThoseOfTheSum) {
         const Eigen::Matrix2d root = UnitFrame(truth).root;
         model.p << 0.02, -0.03, root(0, 0) + 0.03, root(0, 1), root(1, 1) - 0.02, 1.04 * s, scene.paper, -0.7, 0, 0,
             c.ratio;
-        fit.gather(truth, model, {6 * s + 2, 6 * s + 2, 1.8}, 16, c.ratio, false);
+        fit.gather(truth, model, {6 * s + 2, 6 * s + 2, 1.8}, 16, c.ratio, {0, 0}, false);
         ASSERT_TRUE(fit.solve(model, 20, 1e-5, 0, true));
         information[int(sum)] = fit.information();
         if (sum == ContourSum::quick) quick_ones += fit.quick();

@@ -102,6 +102,30 @@ TEST(Detect, CirclesOfHundredsOfPixels) {
   EXPECT_EQ(ids_of(found), std::vector<int>{one.target.id});
 }
 
+// From nearby, the ellipses of concentric circles are not concentric: here by a tenth of a pixel.
+TEST(Detect, RingsSeenObliquelyFromNearby) {
+  for (const double minor_px : {14.0, 20.0}) {
+    Wall wall;
+    wall.camera = test::part_of_camera(1300, 560, 800, {650, 280});
+    wall.add(wall.designs[0].family.ids()[30], {650, 280}, minor_px, 60 * kDegree, 0.3);
+    rig::PrintPhotoOptions options = usual();
+    options.edge_samples = 16;
+    options.noise_read = 1e-4;
+    const Detections found = detect(wall.photo(kGreenRoom, options), set_of(wall.designs));
+    ASSERT_EQ(found.targets.size(), 1u);
+    const std::vector<Cell> cells = wall.designs[0].family.cells(wall.targets[0].id);
+    int rings = 0;
+    double squares = 0;
+    for (const Feature& f : found.targets[0].features) {
+      if (cells[std::size_t(f.index)] != Cell::light) continue;
+      ++rings;
+      squares += (f.pixel - test::true_center(wall.camera, wall.designs[0], wall.targets[0], f.index)).squaredNorm();
+    }
+    ASSERT_GE(rings, 6);
+    EXPECT_LT(std::sqrt(squares / rings), 0.002) << minor_px;
+  }
+}
+
 TEST(Detect, ManyTargetsInOnePhotograph) {
   Wall wall;
   for (int i = 0; i < 12; ++i)

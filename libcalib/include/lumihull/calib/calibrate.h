@@ -43,7 +43,8 @@ struct LUMIHULL_API CalibrateOptions {
   bool more_if_needed = true;
   BodyModel model = BodyModel::rigid;  ///< of targets and boards
   bool rig = false;                    ///< several cameras are fixed to each other; `shot` says what belongs together
-  /// Photographs that the model of the targets is made from, the rest is placed by resection (paper, 3.1); 0: all.
+  /// Photographs that the model of the targets is made from; the rest is placed by resection (paper, 3.1) and joins the
+  /// last adjustment. 0: all of them make the model.
   int model_photos = 150;
   double outlier_sigma = 4;    ///< observations farther off, in standard deviations (2-D), are removed and named
   std::vector<ScaleBar> bars;  ///< body_a, body_b: indices into `bodies_of(set, …)`'s answer
@@ -82,7 +83,7 @@ struct CalibratedPhoto {
   std::optional<Pose> cam_from_part;
   /// Of (rotation vector, translation) of a small motion applied after cam_from_world: rad, m.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  bool in_model = false;  ///< took part in the adjustment; else placed by resection
+  bool in_model = false;  ///< the targets' model was made from it; else placed by resection, and adjusted at last
   std::string reason;     ///< why it is in the model, or was placed afterwards, or has no pose
   int part = -1;          ///< which connected part of the photographs it belongs to; 0: the largest; -1: none
   int points = 0;         ///< that count

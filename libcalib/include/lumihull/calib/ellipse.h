@@ -62,6 +62,9 @@ struct LUMIHULL_API EllipseOptions {
   double min_contrast_noise = 5;  ///< contrast over noise, below which nothing is measured
   /// Of a ring: diameter of the concentric inner contour over that of the one that is measured, 0 … 0.9. 0: a disc.
   double inner_ratio = 0;
+  /// Of a ring: centre of the inner contour less that of the outer one, px. Where concentric circles are seen obliquely
+  /// from nearby their ellipses are not concentric.
+  Eigen::Vector2d inner_offset{0, 0};
 
   void validate() const;
 };

@@ -3,12 +3,18 @@
 #include <lumihull/capture/operator.h>
 #include <lumihull/capture/robot.h>
 
+#include <cstdint>
+
 namespace lumihull::capture {
 
-/// A turntable that a person turns: asks for each stop's azimuth, then for Enter.
-class LUMIHULL_API TurntableRobot : public Robot {
+/// A person who brings camera and object to each stop: turns a turntable, or moves the camera. Each stop is asked for.
+class LUMIHULL_API OperatorRobot : public Robot {
  public:
-  explicit TurntableRobot(Operator& who) : who_(who) {}
+  enum class Moves : std::uint8_t {
+    turntable,  ///< asked for the stop's azimuth
+    camera,     ///< in the hand or on a tripod: asked for the stop's place
+  };
+  OperatorRobot(Moves moves, Operator& who) : moves_(moves), who_(who) {}
   State state() override;
   void move_to(const PlannedStop& stop, Job& job) override;
   void set_roll(double roll_rad, Job& job) override;
@@ -16,20 +22,7 @@ class LUMIHULL_API TurntableRobot : public Robot {
   void make_safe() noexcept override {}
 
  private:
-  Operator& who_;
-};
-
-/// A person who holds the camera, or moves a tripod: asks for each stop's place.
-class LUMIHULL_API HandRobot : public Robot {
- public:
-  explicit HandRobot(Operator& who) : who_(who) {}
-  State state() override;
-  void move_to(const PlannedStop& stop, Job& job) override;
-  void set_roll(double roll_rad, Job& job) override;
-  void declare_position(const PlannedStop&) override {}
-  void make_safe() noexcept override {}
-
- private:
+  Moves moves_;
   Operator& who_;
 };
 

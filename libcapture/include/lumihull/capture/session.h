@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -32,6 +33,8 @@ struct SessionOptions {
   double page_every_s = 5;                       ///< contact.html and capture.json, while it goes on
   std::map<std::string, Camera> intrinsics;      ///< by the plan's camera names, where they are known
   std::string devices;                           ///< words for the journal: which robot, which cameras
+  /// Waits until the camera hangs still, the seconds asked for, where time does not pass by the clock: a simulation's.
+  std::function<void(double seconds, Job& job)> settle{};
 };
 
 /// What was found before anything moves.

@@ -24,7 +24,8 @@ struct PathView {
 LUMIHULL_API std::string frame_name(std::size_t i);
 
 /// The direction that the photographs have as up: the mean of the cameras' up axes (-y), unit length. Cameras on a ring
-/// look down on the object from around; their ups' horizontal parts cancel. (0, 0, 1) where the mean vanishes.
+/// look down on the object from around; their ups' horizontal parts cancel. Where the x axes agree much more than the y
+/// axes pictures are in portrait, and up is along x, to the side from which cameras look. (0, 0, 1) where all vanish.
 LUMIHULL_API Eigen::Vector3d up_axis(std::span<const View> views);
 
 struct TurntableOptions {

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 namespace lumihull::rig {
 
@@ -20,6 +21,13 @@ struct LightOptions {
   int floor_texels = 160;  ///< along a side of the floor's light map; walls have a fifth of it
   float vertex_spacing =
       .01f;  ///< triangles are split until their edges are shorter than this part of the object's size
+};
+
+/// A cable or the like: a cylinder that is dark, thin, and throws no shadow.
+struct ThinLine {
+  Eigen::Vector3d from, to;  ///< world, m
+  float radius = .001f;      ///< m
+  Eigen::Vector3f color{.012f, .012f, .013f};  ///< radiance
 };
 
 /// What happens between the lens and the file.
@@ -36,6 +44,7 @@ struct PhotoOptions {
   double read_noise = 9;                     ///< electrons
   bool bayer = false;                        ///< the sensor sees one colour a pixel (RGGB), demosaiced bilinearly
   bool depth = false;                        ///< fill Photo::depth
+  std::vector<ThinLine> lines;                ///< objects hide them; masks don't know of them
   int reduce = 1;  ///< > 1: light is traced at 1/reduce of the size and enlarged bicubically; noise at full size
 };
 

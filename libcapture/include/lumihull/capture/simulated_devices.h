@@ -7,10 +7,10 @@
 #include <optional>
 #include <string>
 
-namespace lumihull::rig {
+namespace lumihull::capture {
 
 /// A robot that only takes its time. What a controller remembers while the program is killed is kept in a file.
-class SimulatedRobot : public capture::Robot {
+class LUMIHULL_API SimulatedRobot : public capture::Robot {
  public:
   struct Options {
     double time_scale = 0.02;      ///< seconds for a second of the plan's travel
@@ -44,7 +44,7 @@ class SimulatedRobot : public capture::Robot {
 
 /// A camera that writes small JPEGs, each different: by its name, the robot's stop and the shot's number. It keeps a
 /// list of its exposures in a file, as a camera's own counter would.
-class SimulatedCamera : public capture::CameraDevice {
+class LUMIHULL_API SimulatedCamera : public capture::CameraDevice {
  public:
   struct Options {
     std::string name = "camera";
@@ -76,4 +76,4 @@ class SimulatedCamera : public capture::CameraDevice {
   bool ready_ = false;
 };
 
-}  // namespace lumihull::rig
+}  // namespace lumihull::capture

@@ -2,7 +2,7 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
 #include <lumihull/base/image.h>
-#include <lumihull/rig/simulated_devices.h>
+#include <lumihull/capture/simulated_devices.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 #include <sstream>
 #include <thread>
 
-namespace lumihull::rig {
+namespace lumihull::capture {
 
 namespace fs = std::filesystem;
 using capture::PlannedStop;
@@ -151,4 +151,4 @@ ShotOutcome SimulatedCamera::recall(ShotId id) {
   return {ShotState::refused, {}, "not on the camera's list"};
 }
 
-}  // namespace lumihull::rig
+}  // namespace lumihull::capture
