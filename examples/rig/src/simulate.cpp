@@ -53,7 +53,7 @@ std::string options_json(const SimulateOptions& o) {
   json["width"] = o.width, json["focal_mm"] = o.focal_mm, json["distortion"] = o.distortion;
   json["jpeg_quality"] = o.jpeg_quality, json["cables"] = o.cables;
   const LightOptions& l = o.light;
-  json["light"] = {l.ambient_rays, l.lamp_rays, l.floor_texels, l.vertex_spacing};
+  json["light"] = {l.ambient_rays, l.lamp_rays, l.bounces, l.floor_texels, l.vertex_spacing};
   const PhotoOptions& p = o.photo;
   json["photo"] = {{"rays", p.rays},           {"edge_rays", p.edge_rays}, {"blur_px", p.blur_px},
                    {"f_number", p.f_number},   {"focus_m", p.focus_m},     {"exposure", p.exposure},

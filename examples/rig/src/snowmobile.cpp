@@ -87,8 +87,8 @@ Distances groups(const Vector3f& p) {
   metal = std::fmin(metal, capsule(q, {1.36f, .16f, .55f}, {1.22f, .19f, .47f}, .024f, .024f));
   d[kMetal] = std::fmin(metal, skis);
 
-  d[kGlass] = std::fmin(ellipsoid(q, {-1.10f, .130f, .525f}, {.11f, .075f, .050f}),
-                        rounded_box(q, {1.155f, 0, .72f}, {.05f, .09f, .035f}, .02f));
+  d[kGlass] = std::fmin(ellipsoid(q, {-1.215f, .130f, .540f}, {.080f, .075f, .050f}),
+                        rounded_box(q, {1.195f, 0, .69f}, {.055f, .10f, .04f}, .02f));
   return d;
 }
 
