@@ -17,8 +17,8 @@ lh_status lh_truth_compare(lh_context* ctx, const lh_capture* capture, const cha
 
 void lh_truth_comparison_destroy(lh_truth_comparison* comparison) { delete comparison; }
 
-lh_status lh_truth_comparison_describe(lh_context* ctx, const lh_truth_comparison* comparison, char* buffer, size_t size,
-                                       size_t* needed) {
+lh_status lh_truth_comparison_describe(lh_context* ctx, const lh_truth_comparison* comparison, char* buffer,
+                                       size_t size, size_t* needed) {
   return guarded(ctx, [&] { give_text(given(comparison, "comparison").value.to_json(), buffer, size, needed); });
 }
 

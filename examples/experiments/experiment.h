@@ -39,7 +39,8 @@ std::vector<Experiment> object_experiments();
 /// Sections 5.1 and 5.2.
 Json measure_repeatability(const std::filesystem::path& folder, const Size& size, Job& job);
 Json measure_stability(const std::filesystem::path& folder, const Size& size, Job& job);
-/// An object of 12 m, cables that stretch (section 6).
+/// Cables that stretch in a room for an object of 12 m, and such an object (section 6).
+Json measure_elastic(const std::filesystem::path& folder, const Size& size, Job& job);
 Json measure_large(const std::filesystem::path& folder, const Size& size, Job& job);
 /// Gloss and colour bleeding.
 Json measure_gloss(const std::filesystem::path& folder, const Size& size, Job& job);

@@ -29,7 +29,8 @@ std::vector<ex::Experiment> all() {
   for (ex::Experiment& e : ex::object_experiments()) list.push_back(std::move(e));
   list.push_back({"gloss", "a glossy object: its highlight in new views", ex::measure_gloss});
   list.push_back({"bleeding", "the enclosure's colour on the object, with and without despill", ex::measure_bleeding});
-  list.push_back({"large", "an object of 12 m, cables that stretch (section 6)", ex::measure_large});
+  list.push_back({"elastic", "cables that stretch, in a room for an object of 12 m (section 6)", ex::measure_elastic});
+  list.push_back({"large", "an object of 12 m (section 6)", ex::measure_large});
   return list;
 }
 

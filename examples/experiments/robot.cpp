@@ -250,10 +250,11 @@ capture::Mechanism enlarged(double times) {
   return m;
 }
 
+constexpr double kSize_m = 12, kRadius_m = 12 / 2.8 * 2.7;  // as the snowmobile, larger
+
 }  // namespace
 
-Json measure_large(const fs::path& folder, const Size& size, Job& job) {
-  constexpr double kSize_m = 12, kRadius_m = 12 / 2.8 * 2.7;
+Json measure_elastic(const fs::path&, const Size&, Job& job) {
   const double times = kRadius_m / 1.5;  // the paper's mechanism was designed for 1.5 m
   const capture::Mechanism mechanism = enlarged(times);
   capture::HemisphereOptions options;
@@ -294,20 +295,23 @@ Json measure_large(const fs::path& folder, const Size& size, Job& job) {
   out["elasticity_ignored"] = ignored.json();
   out["elasticity_considered"] = considered.json();
   out["stiffness_wrong_by_10_percent"] = wrong_stiffness.json();
+  return out;
+}
 
+Json measure_large(const fs::path& folder, const Size& size, Job& job) {
   rig::SimulateOptions s;
   s.object = "snowmobile";
   s.size_m = kSize_m;
   s.photos = size.photos(600);
   s.radius_m = kRadius_m;
-  s.focal_mm = 10;
+  s.focal_mm = 14;  // the sheets would be larger than the walls with 10
   s.width = size.width();
-  s.circle_px = size.circle_px();
-  s.density = size.density();
-  s.room_radius_m = 0;
+  s.circle_px = 6;
+  s.density = 0.2;
   s.lens_photos = 0, s.empty_photos = 6, s.test_views = 4;
   s.photo.blur_px = 0.6;
-  out["model"] = model_of(folder / "capture", s, size, job);
+  Json out = model_of(folder / "capture", s, size, job);
+  out["size_m"] = kSize_m;
   return out;
 }
 

@@ -59,8 +59,8 @@ Image side_by_side(const Image& reference, const Image& picture) {
 
 TestViewEvaluation evaluate_test_views(const fs::path& folder, const Methods& methods,
                                        const std::array<std::uint8_t, 3>& background,
-                                       const std::function<Pose(const Pose&)>& placed, const fs::path& folder_of_pictures,
-                                       Job& job) {
+                                       const std::function<Pose(const Pose&)>& placed,
+                                       const fs::path& folder_of_pictures, Job& job) {
   const std::vector<PathView> views = read_camera_path(folder / "test_views.json");
   const fs::path truth_file = folder / "test_highlights.json";
   std::vector<ViewHighlights> truth;

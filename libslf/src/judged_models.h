@@ -81,8 +81,8 @@ class JudgedModels {
 Image side_by_side(const Image& reference, const Image& picture);
 
 /// Renders the views of a folder of truth (see EvaluateOptions::test_views) and compares. `placed`: from a view's
-/// cam_from_world to that of the model's world; empty: the worlds are one. `pictures`: a folder for side_by_side's as NAME.METHOD.png; empty: none are written.
-/// Errors: not_found, bad_input, io.
+/// cam_from_world to that of the model's world; empty: the worlds are one. `pictures`: a folder for side_by_side's as
+/// NAME.METHOD.png; empty: none are written. Errors: not_found, bad_input, io.
 TestViewEvaluation evaluate_test_views(const std::filesystem::path& folder, const Methods& methods,
                                        const std::array<std::uint8_t, 3>& background,
                                        const std::function<Pose(const Pose&)>& placed,

@@ -23,7 +23,9 @@ std::filesystem::path test_folder(const Capture& capture) {
   return effective<std::string>(capture, "evaluate", "test_views");
 }
 
-std::filesystem::path truth_folder(const Capture& capture) { return effective<std::string>(capture, "evaluate", "truth"); }
+std::filesystem::path truth_folder(const Capture& capture) {
+  return effective<std::string>(capture, "evaluate", "truth");
+}
 
 bool needed(const Capture& capture, std::string& why) {
   if (!held_out_shots(capture).empty() || !truth_folder(capture).empty()) return true;
@@ -150,7 +152,8 @@ const StageDefinition& evaluate_stage() {
            {},
            true},
           {"truth",
-           "folder of truth about the capture, as the virtual rig writes it: what everything is compared with; empty: none",
+           "folder of truth about the capture, as the virtual rig writes it: what everything is compared with; empty: "
+           "none",
            std::string(),
            0,
            0,

@@ -8,7 +8,7 @@ namespace {
 constexpr double kLine = 1e-3;  // centres whose second principal axis is shorter than this share lie on a line
 
 struct Moments {
-  Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = from;           // means
+  Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = from;            // means
   Eigen::Matrix3d product = Eigen::Matrix3d::Zero(), spread = product;  // Σ (y - ȳ)(x - x̄)ᵀ, Σ (x - x̄)(x - x̄)ᵀ
 };
 

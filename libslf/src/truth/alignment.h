@@ -16,7 +16,9 @@ struct Similarity {
   double scale = 1;
   Pose motion;
 
-  Eigen::Vector3d operator*(const Eigen::Vector3d& p) const { return motion.rotation * (scale * p) + motion.translation; }
+  Eigen::Vector3d operator*(const Eigen::Vector3d& p) const {
+    return motion.rotation * (scale * p) + motion.translation;
+  }
 
   /// A true camera as it stands in the capture's world, in the capture's unit.
   Pose in_capture(const Pose& cam_from_truth) const {

@@ -120,8 +120,9 @@ TruthComparison compare_with_truth(const Capture& capture, const fs::path& folde
 
   const bool has_mesh = file_exists(folder / "mesh.ply"), has_hull = file_exists(capture.hull_path());
   if (has_mesh && has_hull)
-    out.surface = truth::compare_surface(capture, hull::read_mesh(capture.hull_path()),
-                                         hull::read_mesh(folder / "mesh.ply"), *truth_from_capture, pairs, options, job);
+    out.surface =
+        truth::compare_surface(capture, hull::read_mesh(capture.hull_path()), hull::read_mesh(folder / "mesh.ply"),
+                               *truth_from_capture, pairs, options, job);
   else
     out.left_out.push_back(without("surface", has_mesh ? "the capture has no hull.ply" : "the truth has no mesh.ply"));
   compare_views(capture, folder, *truth_from_capture, options, out, job);

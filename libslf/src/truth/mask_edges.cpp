@@ -106,9 +106,7 @@ double DistanceHistogram::within(double distance) const {
 
 double DistanceHistogram::mean() const { return total_ ? double(sum_) / double(total_) / kSteps : 0; }
 
-double DistanceHistogram::rms() const {
-  return total_ ? std::sqrt(double(squares_) / double(total_)) / kSteps : 0;
-}
+double DistanceHistogram::rms() const { return total_ ? std::sqrt(double(squares_) / double(total_)) / kSteps : 0; }
 
 double DistanceHistogram::quantile(double q) const {
   const double wanted = q * double(total_);

@@ -11,8 +11,8 @@
 
 namespace lumihull::slf::truth {
 
-/// The 127.5 level of a mask, bilinear between the centres of pixels (marching squares): a segment or two in each square of
-/// four centres. The picture's border is no edge.
+/// The 127.5 level of a mask, bilinear between the centres of pixels (marching squares): a segment or two in each
+/// square of four centres. The picture's border is no edge.
 class MaskEdges {
  public:
   struct Segment {
@@ -35,7 +35,8 @@ class MaskEdges {
   std::vector<std::uint32_t> starts_;  // of each square in segments_, and the end
 };
 
-/// Lengths, gathered with weights in steps of 1/64 px up to kReach: bounded memory, sums that do not depend on the order.
+/// Lengths, gathered with weights in steps of 1/64 px up to kReach: bounded memory, sums that do not depend on the
+/// order.
 class DistanceHistogram {
  public:
   static constexpr float kReach = 64;
@@ -58,8 +59,8 @@ class DistanceHistogram {
   float max_ = 0;
 };
 
-/// Connected parts of a mask (>= 128, by eight neighbours) or of what is left (by four), as far as the truth is mostly the
-/// other: islands and holes. Background that reaches the picture's border is no hole.
+/// Connected parts of a mask (>= 128, by eight neighbours) or of what is left (by four), as far as the truth is mostly
+/// the other: islands and holes. Background that reaches the picture's border is no hole.
 struct FalseParts {
   std::size_t holes = 0, hole_px = 0, islands = 0, island_px = 0;
 };

@@ -17,9 +17,7 @@ inline Spread spread_of(std::vector<double> values) {
   double sum = 0, squares = 0;
   for (const double v : values) sum += v, squares += v * v;
   const double n = double(values.size());
-  const auto quantile = [&](double q) {
-    return values[std::size_t(std::max(0.0, std::ceil(q * n) - 1))];
-  };
+  const auto quantile = [&](double q) { return values[std::size_t(std::max(0.0, std::ceil(q * n) - 1))]; };
   s.mean = sum / n;
   s.rms = std::sqrt(squares / n);
   s.median = quantile(0.5);

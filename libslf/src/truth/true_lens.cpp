@@ -72,11 +72,7 @@ std::vector<LensTruth> compare_lenses(const Capture& capture, std::span<const Pa
   for (const auto& [camera, pair] : first) {
     const Camera &found = capture.cameras[std::size_t(camera)], &truth = pair->truth.camera;
     const Difference d = projection_difference(found, truth);
-    out.push_back({camera,
-                   100 * (found.f / truth.f - 1),
-                   {found.u0 - truth.u0, found.v0 - truth.v0},
-                   d.rms,
-                   d.max});
+    out.push_back({camera, 100 * (found.f / truth.f - 1), {found.u0 - truth.u0, found.v0 - truth.v0}, d.rms, d.max});
   }
   return out;
 }

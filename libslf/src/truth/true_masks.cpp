@@ -74,20 +74,18 @@ std::optional<MaskTruth> compare_masks(const Capture& capture, const std::filesy
   out.shots.resize(shots.size());
   std::vector<DistanceHistogram> distances((shots.size() + 15) / 16);  // one for each chunk: memory stays bounded
   job.begin("masks beside the truth", shots.size());
-  parallel_chunks(
-      job, shots.size(), 16,
-      [&](std::size_t first, std::size_t last) {
-        for (std::size_t i = first; i < last; ++i) {
-          job.check();
-          const std::string& name = capture.shots[shots[i]].name;
-          const Image mask = capture.read_mask(shots[i]);
-          Judged judged = judge(mask, true_mask(folder / (name + ".png"), mask));
-          judged.shot.name = name;
-          out.shots[i] = std::move(judged.shot);
-          distances[first / 16].add(judged.distances);
-          job.advance();
-        }
-      });
+  parallel_chunks(job, shots.size(), 16, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      job.check();
+      const std::string& name = capture.shots[shots[i]].name;
+      const Image mask = capture.read_mask(shots[i]);
+      Judged judged = judge(mask, true_mask(folder / (name + ".png"), mask));
+      judged.shot.name = name;
+      out.shots[i] = std::move(judged.shot);
+      distances[first / 16].add(judged.distances);
+      job.advance();
+    }
+  });
   job.end();
   DistanceHistogram all;
   for (const DistanceHistogram& h : distances) all.add(h);

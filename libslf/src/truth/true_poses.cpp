@@ -107,8 +107,8 @@ void compare_poses(const Capture& capture, std::span<const Pair> pairs, const Ca
     PoseTruth::Shot& shot = poses.shots.emplace_back();
     shot.name = capture.shots[pairs[i].shot].name;
     shot.center_mm = 1000 * (s * found.center() - pairs[i].truth.center()).norm();
-    shot.rotation_deg = 180 / std::numbers::pi *
-                        found.rotation.angularDistance(s.in_capture(pairs[i].truth.cam_from_world).rotation);
+    shot.rotation_deg =
+        180 / std::numbers::pi * found.rotation.angularDistance(s.in_capture(pairs[i].truth.cam_from_world).rotation);
     centers.push_back(shot.center_mm);
     rotations.push_back(shot.rotation_deg);
     if (const auto info = information(capture, pairs[i].shot)) {

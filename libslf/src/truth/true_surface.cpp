@@ -22,7 +22,8 @@ struct Distances {
 };
 
 /// Evenly over `from`, and its vertices besides for the largest: they are where surfaces stick out most.
-Distances distances(const hull::Mesh& from, const hull::SurfaceDistance& to, std::size_t samples, bool outside, Job& job) {
+Distances distances(const hull::Mesh& from, const hull::SurfaceDistance& to, std::size_t samples, bool outside,
+                    Job& job) {
   const std::vector<Eigen::Vector3f> points = hull::surface_points(from, samples);
   Distances d;
   d.mm.resize(points.size());

@@ -32,8 +32,9 @@ TargetPairs paired_targets(const Capture& capture, std::span<const TrueTarget> t
   std::map<Key, const TrueTarget*> truth;
   for (const TrueTarget& t : targets) {
     if (t.design >= int(model.set.designs.size()))
-      throw Error(ErrorCode::bad_input, "the truth names a design " + std::to_string(t.design) + ", of which the " +
-                                            "capture's targets have " + std::to_string(model.set.designs.size()),
+      throw Error(ErrorCode::bad_input,
+                  "the truth names a design " + std::to_string(t.design) + ", of which the " +
+                      "capture's targets have " + std::to_string(model.set.designs.size()),
                   "targets.json");
     truth.emplace(Key(t.design, t.id), &t);
   }

@@ -12,8 +12,9 @@ namespace {
 using internal::Json;
 
 Json spread_json(const Spread& s) {
-  return {{"count", s.count},           {"mean", number_json(s.mean)}, {"rms", number_json(s.rms)},
-          {"median", number_json(s.median)}, {"q95", number_json(s.q95)},   {"max", number_json(s.max)}};
+  return {{"count", s.count},          {"mean", number_json(s.mean)},
+          {"rms", number_json(s.rms)}, {"median", number_json(s.median)},
+          {"q95", number_json(s.q95)}, {"max", number_json(s.max)}};
 }
 
 Json poses_json(const PoseTruth& p) {
@@ -27,7 +28,7 @@ Json poses_json(const PoseTruth& p) {
            {"center_mm", spread_json(p.center_mm)},
            {"rotation_deg", spread_json(p.rotation_deg)},
            {"consistency", number_json(p.consistency)},
-           {"consistency_datum", std::isnan(p.consistency)   ? Json(nullptr)
+           {"consistency_datum", std::isnan(p.consistency)  ? Json(nullptr)
                                  : p.consistency_by_targets ? Json("targets")
                                                             : Json("cameras")},
            {"not_placed", p.not_placed},
@@ -54,9 +55,9 @@ Json targets_json(const TargetTruth& t) {
 }
 
 Json masks_json(const MaskTruth& m) {
-  Json out{{"iou_mean", m.iou_mean}, {"iou_least", m.iou_least}, {"edge_px", spread_json(m.edge_px)},
-           {"within_1.5_px", m.within}, {"bias_px", number_json(m.bias_px)}, {"holes", m.holes}, {"islands", m.islands},
-           {"without_truth", m.without_truth}, {"shots", Json::array()}};
+  Json out{{"iou_mean", m.iou_mean},    {"iou_least", m.iou_least},          {"edge_px", spread_json(m.edge_px)},
+           {"within_1.5_px", m.within}, {"bias_px", number_json(m.bias_px)}, {"holes", m.holes},
+           {"islands", m.islands},      {"without_truth", m.without_truth},  {"shots", Json::array()}};
   for (const MaskTruth::Shot& s : m.shots)
     out["shots"].push_back({{"name", s.name},
                             {"iou", s.iou},
@@ -118,39 +119,43 @@ std::vector<std::string> TruthComparison::summary() const {
   std::vector<std::string> out;
   if (poses) {
     const PoseTruth& p = *poses;
-    out.push_back(line("poses: %zu of %zu placed; centres RMS %.3g mm, median %.3g, at most %.3g; rotations RMS %.3g°, "
-                       "at most %.3g°",
-                       p.shots.size(), p.shots.size() + p.not_placed.size(), p.center_mm.rms, p.center_mm.median,
-                       p.center_mm.max, p.rotation_deg.rms, p.rotation_deg.max));
+    out.push_back(
+        line("poses: %zu of %zu placed; centres RMS %.3g mm, median %.3g, at most %.3g; rotations RMS %.3g°, "
+             "at most %.3g°",
+             p.shots.size(), p.shots.size() + p.not_placed.size(), p.center_mm.rms, p.center_mm.median, p.center_mm.max,
+             p.rotation_deg.rms, p.rotation_deg.max));
     if (!std::isnan(p.scale_error_ppm)) out.push_back(line("scale: %.1f ppm too large", p.scale_error_ppm));
     if (!std::isnan(p.consistency))
       out.push_back(line("covariances: mean Mahalanobis² / 6 is %.2f (%s aligned)", p.consistency,
                          p.consistency_by_targets ? "targets" : "cameras"));
   }
   for (const LensTruth& l : lenses)
-    out.push_back(line("camera %d: focal length %+.4f %%, principal point (%+.2f, %+.2f) px, projection RMS %.3g px, at "
-                       "most %.3g",
-                       l.camera, l.focal_error_percent, l.principal_point_px.x(), l.principal_point_px.y(),
-                       l.projection_rms_px, l.projection_max_px));
+    out.push_back(
+        line("camera %d: focal length %+.4f %%, principal point (%+.2f, %+.2f) px, projection RMS %.3g px, at "
+             "most %.3g",
+             l.camera, l.focal_error_percent, l.principal_point_px.x(), l.principal_point_px.y(), l.projection_rms_px,
+             l.projection_max_px));
   if (targets)
     out.push_back(line("targets: %zu, points RMS %.3g mm, at most %.3g; %zu wrong ids, %zu not solved",
                        targets->targets.size(), targets->point_mm.rms, targets->point_mm.max, targets->wrong_ids.size(),
                        targets->not_solved.size()));
   if (masks)
-    out.push_back(line("masks: %zu, IoU %.4f, at least %.4f; edges 95 %% within %.2f px, %.1f %% within 1.5 px, bias "
-                       "%+.2f px; %zu holes, %zu islands",
-                       masks->shots.size(), masks->iou_mean, masks->iou_least, masks->edge_px.q95, 100 * masks->within,
-                       masks->bias_px, masks->holes, masks->islands));
+    out.push_back(
+        line("masks: %zu, IoU %.4f, at least %.4f; edges 95 %% within %.2f px, %.1f %% within 1.5 px, bias "
+             "%+.2f px; %zu holes, %zu islands",
+             masks->shots.size(), masks->iou_mean, masks->iou_least, masks->edge_px.q95, 100 * masks->within,
+             masks->bias_px, masks->holes, masks->islands));
   if (surface) {
     const SurfaceTruth& s = *surface;
-    out.push_back(line("surface: hull to truth mean %.3g mm, RMS %.3g, 95 %% %.3g, at most %.3g; truth to hull mean %.3g, "
-                       "RMS %.3g, 95 %% %.3g, at most %.3g (voxel %.3g mm)",
-                       s.hull_to_truth_mm.mean, s.hull_to_truth_mm.rms, s.hull_to_truth_mm.q95, s.hull_to_truth_mm.max,
-                       s.truth_to_hull_mm.mean, s.truth_to_hull_mm.rms, s.truth_to_hull_mm.q95, s.truth_to_hull_mm.max,
-                       s.voxel_mm));
-    out.push_back(line("         volume ratio %.4f; %.3f %% of the true surface more than %g mm outside, at most %.3g mm; "
-                       "silhouettes' IoU %.4f, at least %.4f",
-                       s.volume_ratio, 100 * s.outside_share, s.outside_mm, s.outside_max_mm, s.iou_mean, s.iou_least));
+    out.push_back(line(
+        "surface: hull to truth mean %.3g mm, RMS %.3g, 95 %% %.3g, at most %.3g; truth to hull mean %.3g, "
+        "RMS %.3g, 95 %% %.3g, at most %.3g (voxel %.3g mm)",
+        s.hull_to_truth_mm.mean, s.hull_to_truth_mm.rms, s.hull_to_truth_mm.q95, s.hull_to_truth_mm.max,
+        s.truth_to_hull_mm.mean, s.truth_to_hull_mm.rms, s.truth_to_hull_mm.q95, s.truth_to_hull_mm.max, s.voxel_mm));
+    out.push_back(
+        line("         volume ratio %.4f; %.3f %% of the true surface more than %g mm outside, at most %.3g mm; "
+             "silhouettes' IoU %.4f, at least %.4f",
+             s.volume_ratio, 100 * s.outside_share, s.outside_mm, s.outside_max_mm, s.iou_mean, s.iou_least));
   }
   if (views) {
     for (const auto& [method, q] : views->methods)

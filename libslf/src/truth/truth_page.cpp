@@ -37,10 +37,10 @@ std::string spreads(const std::vector<Column>& columns) {
   for (const Column& c : columns) out += "<th>" + c.name + "</th>";
   out += "</tr>\n";
   const std::pair<const char*, double Spread::*> rows[] = {{"mean", &Spread::mean},
-                                                          {"RMS", &Spread::rms},
-                                                          {"median", &Spread::median},
-                                                          {"95 %", &Spread::q95},
-                                                          {"largest", &Spread::max}};
+                                                           {"RMS", &Spread::rms},
+                                                           {"median", &Spread::median},
+                                                           {"95 %", &Spread::q95},
+                                                           {"largest", &Spread::max}};
   for (const auto& [name, member] : rows) {
     out += std::string("<tr><td>") + name + "</td>";
     for (const Column& c : columns) out += "<td>" + formatted(c.format, c.spread->*member) + "</td>";
@@ -120,8 +120,9 @@ std::string lenses(const std::vector<LensTruth>& list) {
            "</td><td>" + formatted("%+.3f", l.principal_point_px.x()) + ", " +
            formatted("%+.3f", l.principal_point_px.y()) + "</td><td>" + formatted("%.4f px", l.projection_rms_px) +
            "</td><td>" + formatted("%.4f px", l.projection_max_px) + "</td></tr>\n";
-  return out + "</table>\n<p class=\"dim\">Projection: pixels of rays at infinity over the picture, a rotation of the "
-               "camera taken off.</p>\n";
+  return out +
+         "</table>\n<p class=\"dim\">Projection: pixels of rays at infinity over the picture, a rotation of the "
+         "camera taken off.</p>\n";
 }
 
 std::string targets(const TargetTruth& t) {
@@ -165,8 +166,11 @@ std::string masks(const Capture& capture, const fs::path& folder, const MaskTrut
                     spreads({{"edges, px", &m.edge_px, "%.3f"}});
   out += bars("Silhouettes' edges", "95 % are nearer than that; dashed: 1.5 px", "photograph", "px",
               column(m.shots, [](const auto& s) { return s.edge_px.q95; }), MaskTruth::kEdgePx);
-  out += bars("What silhouettes miss", "1 - IoU", "photograph", "", column(m.shots, [](const auto& s) { return 1 - s.iou; }));
-  out += "<p class=\"dim\">The worst: red is object in the mask only, blue in the truth only.</p>\n<div class=\"grid wide\">\n";
+  out += bars("What silhouettes miss", "1 - IoU", "photograph", "",
+              column(m.shots, [](const auto& s) { return 1 - s.iou; }));
+  out +=
+      "<p class=\"dim\">The worst: red is object in the mask only, blue in the truth only.</p>\n<div class=\"grid "
+      "wide\">\n";
   for (const std::size_t i : worst(column(m.shots, [](const auto& s) { return 1 - s.iou; }))) {
     job.check();
     const auto shot = std::find_if(capture.shots.begin(), capture.shots.end(),
@@ -176,8 +180,7 @@ std::string masks(const Capture& capture, const fs::path& folder, const MaskTrut
     Image photo = capture.read_photo(index, 3);
     if (photo.type() != PixelType::u8) photo = converted(photo, PixelType::u8, 3);
     const Image mask = capture.read_mask(index);
-    const Image picture =
-        mask_errors(photo, mask, truth::true_mask(folder / "masks" / (shot->name + ".png"), mask));
+    const Image picture = mask_errors(photo, mask, truth::true_mask(folder / "masks" / (shot->name + ".png"), mask));
     out += figure(oriented(fitted(picture, kSide), shot->orientation),
                   shot->name + ": IoU " + formatted("%.4f", m.shots[i].iou) + ", 95 % of the edges within " +
                       formatted("%.2f px", m.shots[i].edge_px.q95));
@@ -188,16 +191,17 @@ std::string masks(const Capture& capture, const fs::path& folder, const MaskTrut
 
 std::string surface(const SurfaceTruth& s) {
   std::string out = "<h2>Surface</h2>\n" + spreads({{"hull to truth, mm", &s.hull_to_truth_mm, "%.4g"},
-                                                     {"truth to hull, mm", &s.truth_to_hull_mm, "%.4g"}});
-  out += "<table>\n" + row("a voxel", formatted("%.3g mm", s.voxel_mm)) +
-         row("RMS in voxels, both ways", formatted("%.2f", s.hull_to_truth_mm.rms / s.voxel_mm) + ", " +
-                                             formatted("%.2f", s.truth_to_hull_mm.rms / s.voxel_mm)) +
-         row("volume, hull / truth", formatted("%.4f", s.volume_ratio)) +
-         row("true surface outside of the hull by more than " + formatted("%g mm", s.outside_mm),
-             formatted("%.3f %%", 100 * s.outside_share)) +
-         row("farthest outside", formatted("%.3g mm", s.outside_max_mm)) +
-         row("silhouettes' IoU, mean and least", formatted("%.4f", s.iou_mean) + ", " + formatted("%.4f", s.iou_least)) +
-         "</table>\n";
+                                                    {"truth to hull, mm", &s.truth_to_hull_mm, "%.4g"}});
+  out +=
+      "<table>\n" + row("a voxel", formatted("%.3g mm", s.voxel_mm)) +
+      row("RMS in voxels, both ways", formatted("%.2f", s.hull_to_truth_mm.rms / s.voxel_mm) + ", " +
+                                          formatted("%.2f", s.truth_to_hull_mm.rms / s.voxel_mm)) +
+      row("volume, hull / truth", formatted("%.4f", s.volume_ratio)) +
+      row("true surface outside of the hull by more than " + formatted("%g mm", s.outside_mm),
+          formatted("%.3f %%", 100 * s.outside_share)) +
+      row("farthest outside", formatted("%.3g mm", s.outside_max_mm)) +
+      row("silhouettes' IoU, mean and least", formatted("%.4f", s.iou_mean) + ", " + formatted("%.4f", s.iou_least)) +
+      "</table>\n";
   return out + bars("Silhouettes of hull and true surface", "1 - IoU; dashed: the mean", "photograph", "",
                     column(s.silhouettes, [](const auto& x) { return 1 - x.iou; }), 1 - s.iou_mean);
 }

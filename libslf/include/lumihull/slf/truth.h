@@ -30,7 +30,8 @@ struct LUMIHULL_API TruthOptions {
   int silhouette_side_px = 960;           ///< larger pictures are judged at so many pixels of their longer side; >= 16
   RenderOptions render{3, false};         ///< of test views
   LumigraphOptions lumigraph;
-  bool pictures = true;  ///< write reference | rendering | difference of test views to evaluate/test_views/ in the capture
+  bool pictures =
+      true;  ///< write reference | rendering | difference of test views to evaluate/test_views/ in the capture
 
   void validate() const;
 };
@@ -65,7 +66,7 @@ struct PoseTruth {
 /// A camera against the true one.
 struct LensTruth {
   int camera = 0;
-  double focal_error_percent = 0;  ///< of f
+  double focal_error_percent = 0;            ///< of f
   Eigen::Vector2d principal_point_px{0, 0};  ///< the capture's less the true one
   /// Between the pixels of a fixed ray at infinity by both lenses, over the picture, once the rotation of the camera
   /// that takes most of it off is taken off.
@@ -109,11 +110,12 @@ struct MaskTruth {
 
 /// The hull against the true surface, after the alignment of the poses.
 struct SurfaceTruth {
-  Spread hull_to_truth_mm, truth_to_hull_mm;  ///< of points evenly over the one surface, from the other; max: Hausdorff's
-  double voxel_mm = kUnknown;                 ///< longest side of the hull's region / resolution, about
-  double volume_ratio = kUnknown;             ///< hull / truth
-  double outside_mm = 0;     ///< TruthOptions::outside_mm
-  double outside_share = 0;  ///< of the true surface, farther outside of the hull than that
+  Spread hull_to_truth_mm,
+      truth_to_hull_mm;            ///< of points evenly over the one surface, from the other; max: Hausdorff's
+  double voxel_mm = kUnknown;      ///< longest side of the hull's region / resolution, about
+  double volume_ratio = kUnknown;  ///< hull / truth
+  double outside_mm = 0;           ///< TruthOptions::outside_mm
+  double outside_share = 0;        ///< of the true surface, farther outside of the hull than that
   double outside_max_mm = 0;
   struct Shot {
     std::string name;
@@ -125,7 +127,7 @@ struct SurfaceTruth {
 
 /// A capture beside the truth about it.
 struct TruthComparison {
-  std::string truth;  ///< the folder
+  std::string truth;                  ///< the folder
   std::vector<std::string> left_out;  ///< what could not be compared, and why; a line each
   std::optional<PoseTruth> poses;
   std::vector<LensTruth> lenses;
@@ -140,7 +142,8 @@ struct TruthComparison {
   LUMIHULL_API std::vector<std::string> summary() const;
 };
 
-/// Compares what a capture holds with a folder of truth as the virtual rig writes it (examples/rig/README.md), in metres:
+/// Compares what a capture holds with a folder of truth as the virtual rig writes it (examples/rig/README.md), in
+/// metres:
 ///
 ///     cameras.json     "lumihull-rig-truth", or "lumihull-cameras" with one camera: intrinsics, poses
 ///     targets.json     "lumihull-rig-targets": where each target hangs
@@ -148,8 +151,9 @@ struct TruthComparison {
 ///     test_views.json, test_views/NAME.png, test_views/masks/NAME.png, test_highlights.json   new views
 ///
 /// What either side does not have is left out and named; without cameras.json only masks can be compared, for the two
-/// worlds are not known to be one. The world of the truth may differ from the capture's by a motion, and by a scale where the
-/// capture's unit is unknown. Masks are read one a thread at a time. The same bytes for any number of threads.
+/// worlds are not known to be one. The world of the truth may differ from the capture's by a motion, and by a scale
+/// where the capture's unit is unknown. Masks are read one a thread at a time. The same bytes for any number of
+/// threads.
 ///
 /// Errors: not_found (no such folder; none of these files in it), bad_input (a file that is damaged or contradicts the
 /// capture or another file: sizes, names; names what was expected), invalid_argument (options), cancelled.
