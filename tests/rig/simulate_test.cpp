@@ -27,7 +27,7 @@ SimulateOptions small() {
   o.size_m = .3;
   o.photos = 10;
   o.width = 900;
-  o.circle_px = 7;
+  o.circle_px = 6.5, o.density = .06;
   o.empty_photos = 2, o.lens_photos = 2;
   o.light = test::coarse_light();
   o.photo.reduce = 3, o.photo.blur_px = .6;

@@ -72,12 +72,12 @@ TEST_F(ThinLines, CoverWhatTheirOutlineDoes) {
 }
 
 TEST_F(ThinLines, FollowTheLens) {
-  const Covered straight = draw({-.2, -.14, .6}, {.2, -.14, .6}, .001);
+  const Covered straight = draw({-.4, -.14, .6}, {.4, -.14, .6}, .001);
   view_.camera = sensor_camera(600, 18, kSensorWidth_mm, 1);
-  const Covered bent = draw({-.2, -.14, .6}, {.2, -.14, .6}, .0025);
+  const Covered bent = draw({-.4, -.14, .6}, {.4, -.14, .6}, .0025);
   for (const double wanted : {60.5, 150.5, 300.5, 520.5}) {
     // The line's point in the middle of a column.
-    double low = -.2, high = .2;
+    double low = -.4, high = .4;
     for (int i = 0; i < 60; ++i)
       (view_.camera.project({(low + high) / 2, -.14, .6})->x() < wanted ? low : high) = (low + high) / 2;
     const auto px = view_.camera.project({low, -.14, .6});

@@ -48,9 +48,9 @@ Scene make_studio(Object object, const StudioOptions& o) {
     l.intensity = tint * strength * (l.position - center).squaredNorm();
     scene.lamps.push_back(l);
   };
-  lamp(-1.05f, .75f, .85f, .070f, .76f, {1.f, .96f, .90f});
-  lamp(-2.60f, .76f, .80f, .110f, .36f, {.92f, .97f, 1.f});
-  lamp(1.15f, .70f, .90f, .080f, .46f, {1.f, .98f, .95f});
+  lamp(-1.05f, .75f, .85f, .070f, .66f, {1.f, .96f, .90f});
+  lamp(-2.60f, .76f, .80f, .110f, .31f, {.92f, .97f, 1.f});
+  lamp(1.15f, .70f, .90f, .080f, .40f, {1.f, .98f, .95f});
   return scene;
 }
 
