@@ -90,12 +90,11 @@ std::string animated_png(std::span<const std::string> frames, int delay_ms) {
       put(control, 0);  // plays for ever
       chunk(out, "acTL", control);
     } else if (png.header != header) {
-      throw Error(ErrorCode::bad_input, "expected frames of one size and format",
-                  "frame " + std::to_string(i + 1));
+      throw Error(ErrorCode::bad_input, "expected frames of one size and format", "frame " + std::to_string(i + 1));
     }
     std::string control;
     put(control, sequence++);
-    control += header.substr(0, 8);  // width, height
+    control += header.substr(0, 8);    // width, height
     put(control, 0), put(control, 0);  // at the upper left corner
     put(control, std::uint32_t(delay_ms), 2), put(control, 1000, 2);
     put(control, 0, 1), put(control, 0, 1);  // stays; replaces

@@ -108,12 +108,10 @@ void run(Program& program, const Arguments& a) {
   heading("The model turns");
   turn(program, capture);
   heading("Done");
-  const std::pair<const char*, const char*> results[] = {{"Report", "report.html"},
-                                                         {"Calibration", "calibration.html"},
-                                                         {"Capture", "contact.html"},
-                                                         {"Sheets to print", "print/sheets.pdf"},
-                                                         {"Model", "light_field.glb"},
-                                                         {"It turns", "turntable.png"}};
+  const std::pair<const char*, const char*> results[] = {
+      {"Report", "report.html"},    {"Calibration", "calibration.html"},
+      {"Capture", "contact.html"},  {"Sheets to print", "print/sheets.pdf"},
+      {"Model", "light_field.glb"}, {"It turns", "turntable.png"}};
   std::string json;
   for (const auto& [what, file] : results) {
     char line[40];
@@ -129,8 +127,9 @@ void run(Program& program, const Arguments& a) {
 
 void add_demo(Program& program) {
   const auto a = std::make_shared<Arguments>();
-  CLI::App* verb = program.verb("demo", "the whole way with the virtual rig: photographs, poses, model, report; goes on after a stop",
-                                [&program, a] { run(program, *a); });
+  CLI::App* verb = program.verb(
+      "demo", "the whole way with the virtual rig: photographs, poses, model, report; goes on after a stop",
+      [&program, a] { run(program, *a); });
   verb->add_option("folder", a->folder, "where it all goes [lumihull-demo]");
   verb->add_option("--photos", a->photos, "photographs [48]")->check(CLI::Range(8, 1000));
   verb->add_option("--width", a->width, "of a photograph, px [1536]")->check(CLI::Range(240, 6000));

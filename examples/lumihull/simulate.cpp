@@ -24,15 +24,15 @@ struct Arguments {
 void run(Program& program, Arguments& a) {
   rig::SimulateOptions& o = a.options;
   if (!a.plan.empty()) o.plan = capture::read_plan(a.plan);
-  if (a.unlit.size() == 3)
-    o.unlit = {std::uint8_t(a.unlit[0]), std::uint8_t(a.unlit[1]), std::uint8_t(a.unlit[2])};
+  if (a.unlit.size() == 3) o.unlit = {std::uint8_t(a.unlit[0]), std::uint8_t(a.unlit[1]), std::uint8_t(a.unlit[2])};
   if (a.fast) o.photo.reduce = 3;
   if (a.no_noise) o.photo.full_well = 0;
   if (a.ideal_lens) o.distortion = 0;
   o.sheets = !a.no_sheets, o.cables = !a.no_cables;
   rig::RobotErrors& e = o.errors;
-  for (double* size : {&e.departure_m, &e.attachment_m, &e.offset_m, &e.gain, &e.winch_m, &e.common_m, &e.mount_m, &e.mount_rad,
-                       &e.bearing_rad, &e.table_m, &e.table_rad, &e.hand_m, &e.hand_rad, &e.swing_m, &e.swing_rad})
+  for (double* size :
+       {&e.departure_m, &e.attachment_m, &e.offset_m, &e.gain, &e.winch_m, &e.common_m, &e.mount_m, &e.mount_rad,
+        &e.bearing_rad, &e.table_m, &e.table_rad, &e.hand_m, &e.hand_rad, &e.swing_m, &e.swing_rad})
     *size *= a.robot_errors;
   if (a.no_swing) e.swing_m = e.swing_rad = 0;
 
@@ -59,7 +59,8 @@ void add_simulate(Program& program) {
   CLI::App* verb = program.verb("simulate", "photograph an object with the virtual rig, through a plan and a session",
                                 [&program, a] { run(program, *a); });
   verb->add_option("folder", a->folder, "of the capture, new or begun by the same command")->required();
-  verb->add_option("--object", o.object, "vase, bust, statue, gate, snowmobile, deer, box, sphere, pebble, or a mesh file [bust]");
+  verb->add_option("--object", o.object,
+                   "vase, bust, statue, gate, snowmobile, deer, box, sphere, pebble, or a mesh file [bust]");
   verb->add_option("--size", o.size_m, "longest side of the object, m [as in the paper, or 0.6]");
   verb->add_flag("--matt", o.matt, "the object has no gloss");
   verb->add_flag("--uniform", o.uniform, "the object has one paint all over");
@@ -68,7 +69,8 @@ void add_simulate(Program& program) {
       ->expected(3)
       ->check(CLI::Range(0, 255));
   verb->add_option("--photos", o.photos, "photographs of the object [48]");
-  verb->add_option("--plan", a->plan, "what `lumihull plan` wrote, instead of a hemisphere of views")->type_name("FILE");
+  verb->add_option("--plan", a->plan, "what `lumihull plan` wrote, instead of a hemisphere of views")
+      ->type_name("FILE");
   verb->add_option("--robot", o.carrier,
                    "what carries the camera: cables (the paper's mechanism), turntable, hand, ideal, or auto: cables "
                    "where they can, else ideal [auto]")

@@ -1,6 +1,4 @@
 // lumihull simulate as its users run it; animated PNGs.
-#include "apng.h"
-
 #include <lumihull/base/capture.h>
 #include <lumihull/base/error.h>
 #include <lumihull/base/files.h>
@@ -10,6 +8,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "apng.h"
 #include "process.h"
 #include "support.h"
 
@@ -22,9 +21,10 @@ using testing::HasSubstr;
 TEST(SimulateVerb, MakesACaptureAndGoesOnAfterAStop) {
   const test::TemporaryFolder folder;
   const std::string out = (folder / "c").string();
-  const std::vector<std::string> words{"simulate", out,   "--object", "box",     "--photos",        "4",  "--width", "120",
-                                       "--empty",  "1",   "--robot",  "ideal",   "--lens-photos",   "1",  "--fast",  "--target-px",
-                                       "3",        "--least-targets", "0", "--quiet", "--json"};
+  const std::vector<std::string> words{
+      "simulate", out,       "--object", "box",           "--photos", "4",      "--width",     "120", "--empty",
+      "1",        "--robot", "ideal",    "--lens-photos", "1",        "--fast", "--target-px", "3",   "--least-targets",
+      "0",        "--quiet", "--json"};
   std::size_t kills = 0;
   test::Outcome run;
   for (int i = 0; i < 30; ++i) {
@@ -86,7 +86,8 @@ TEST(AnimatedPng, HoldsItsFrames) {
     const std::string name = film.substr(at + 4, 4);
     if (name == "acTL") frames_told = number(at + 8) == 3;
     if (name == "fcTL") ++frame, EXPECT_EQ(number(at + 8), sequence++), EXPECT_EQ(number(at + 12), 37u);
-    if (name == "fdAT") EXPECT_EQ(number(at + 8), sequence++), data[std::size_t(frame)] += film.substr(at + 12, number(at) - 4);
+    if (name == "fdAT")
+      EXPECT_EQ(number(at + 8), sequence++), data[std::size_t(frame)] += film.substr(at + 12, number(at) - 4);
     if (name == "IDAT") data[0] += film.substr(at + 8, number(at));
   }
   EXPECT_TRUE(frames_told);

@@ -125,7 +125,9 @@ TEST(RigRobot, RemembersWhereItIs) {
 
   for (const char* text : {"", "rig-robot 1\nstop x\n", "rig-robot 1\nclock a b c d\nend\n", "something"}) {
     write_file(folder / "broken", text);
-    EXPECT_EQ(test::expect_error([&] { RigRobot(square(), {{}, folder / "broken", false}); }).code(),
+    EXPECT_EQ(test::expect_error([&] {
+                RigRobot(square(), {{}, folder / "broken", false});
+              }).code(),
               ErrorCode::bad_input)
         << text;
   }

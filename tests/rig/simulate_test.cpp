@@ -45,12 +45,10 @@ Agreement compare(const Capture& capture, const std::vector<std::optional<Exposu
     from += capture.shots[i].cam_from_world->center() / double(n), to += truth[i]->cam_from_world.center() / double(n);
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < n; ++i)
-    sum += (truth[i]->cam_from_world.center() - to) *
-           (capture.shots[i].cam_from_world->center() - from).transpose();
+    sum += (truth[i]->cam_from_world.center() - to) * (capture.shots[i].cam_from_world->center() - from).transpose();
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d turn = svd.matrixU() * svd.matrixV().transpose();
-  if (turn.determinant() < 0)
-    turn = svd.matrixU() * Eigen::Vector3d(1, 1, -1).asDiagonal() * svd.matrixV().transpose();
+  if (turn.determinant() < 0) turn = svd.matrixU() * Eigen::Vector3d(1, 1, -1).asDiagonal() * svd.matrixV().transpose();
   const Pose truth_from_capture = Pose::from_matrix(turn, to - turn * from);
   Agreement out;
   for (std::size_t i = 0; i < n; ++i) {
@@ -157,8 +155,8 @@ TEST(Simulate, GoesOnAfterAKillWithTheSamePhotographs) {
     // The clock went on while it was killed: the same pixels, another time.
     EXPECT_TRUE(test::same_bytes(whole.read_photo(i), again.read_photo(i))) << whole.shots[i].name;
   }
-  for (const char* file : {"sheets.json", "truth/cameras.json", "truth/targets.json", "lens/board_0001.jpg",
-                           "enclosure/empty_0001.jpg"})
+  for (const char* file :
+       {"sheets.json", "truth/cameras.json", "truth/targets.json", "lens/board_0001.jpg", "enclosure/empty_0001.jpg"})
     EXPECT_EQ(sha256_of_file(folder / "whole" / file), sha256_of_file(folder / "killed" / file)) << file;
   for (const Shot& shot : whole.shots) {
     const std::string mask = "truth/masks/" + shot.name + ".png";

@@ -96,7 +96,8 @@ TEST_F(ThinLines, FollowTheLens) {
 
 TEST_F(ThinLines, AreHiddenByWhatStandsBefore) {
   // Through the object's middle, from side to side of the picture.
-  const Covered before = draw({-.3, .01, .5}, {.3, .01, .5}, .002), behind = draw({-.9, .01, 1.9}, {.9, .01, 1.9}, .006);
+  const Covered before = draw({-.3, .01, .5}, {.3, .01, .5}, .002),
+                behind = draw({-.9, .01, 1.9}, {.9, .01, 1.9}, .006);
   const auto at = [&](const Covered& c, double x, double z) {
     const auto px = view_.camera.project({x, .01, z});
     return c.part.row<float>(int(px->y()))[int(px->x())];

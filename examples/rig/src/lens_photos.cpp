@@ -45,7 +45,8 @@ Pose board_pose(const Camera& camera, const FlatPrint& print, int i, std::uint64
                                   Eigen::AngleAxisd(roll, Vector3d::UnitZ());
   const int corner = i % 5;
   const double part = corner == 0 ? 0 : .17;
-  const Vector2d about = part * Vector2d(corner & 1 ? camera.width : -camera.width, corner & 2 ? camera.height : -camera.height) / 2;
+  const Vector2d about =
+      part * Vector2d(corner & 1 ? camera.width : -camera.width, corner & 2 ? camera.height : -camera.height) / 2;
   const Vector3d middle((print.low.x() + print.high.x()) / 2, (print.low.y() + print.high.y()) / 2, 0);
   const double room = .94 - part;
   double near = .01, far = 1000;
@@ -66,8 +67,7 @@ void photograph_board(const fs::path& folder, const RigLens& lens, int n, double
   fs::create_directories(folder);
   calib::TargetSet set;
   set.grids.push_back({calib::PointGrid::Kind::chessboard, 11, 8, kSpacing_m, 0});
-  const FlatPrint print =
-      print_of(set.grids[0], Eigen::Vector3f::Constant(.03f), Eigen::Vector3f::Constant(.80f));
+  const FlatPrint print = print_of(set.grids[0], Eigen::Vector3f::Constant(.03f), Eigen::Vector3f::Constant(.80f));
   job.begin("photographs of the board", std::uint64_t(n));
   parallel_for(
       job, std::size_t(n),

@@ -49,7 +49,8 @@ Pose mean_of(const std::vector<Pose>& cam_from_world) {
 double sway_of(const Camera& camera, const std::vector<Pose>& moments, double distance_m) {
   double longest = 0;
   const Pose& first = moments.front();
-  for (const auto& [x, y] : {std::pair(.5, .5), std::pair(.1, .1), std::pair(.9, .1), std::pair(.1, .9), std::pair(.9, .9)}) {
+  for (const auto& [x, y] :
+       {std::pair(.5, .5), std::pair(.1, .1), std::pair(.9, .1), std::pair(.1, .9), std::pair(.9, .9)}) {
     const auto ray = camera.ray({x * camera.width, y * camera.height});
     if (!ray) continue;
     const Eigen::Vector3d point = first.inverse() * (distance_m * ray->normalized());

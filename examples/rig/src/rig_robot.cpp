@@ -67,8 +67,9 @@ RobotErrors RobotErrors::none() {
 RigRobot::RigRobot(const capture::Plan& plan, const Options& options)
     : kind_(plan.robot), mechanism_(plan.mechanism), options_(options), woke_(std::chrono::steady_clock::now()) {
   const RobotErrors& e = options_.errors;
-  for (const double x : {e.departure_m, e.attachment_m, e.offset_m, e.gain, e.winch_m, e.common_m, e.mount_m, e.mount_rad,
-                         e.bearing_rad, e.table_m, e.table_rad, e.hand_m, e.hand_rad, e.swing_m, e.swing_rad})
+  for (const double x :
+       {e.departure_m, e.attachment_m, e.offset_m, e.gain, e.winch_m, e.common_m, e.mount_m, e.mount_rad, e.bearing_rad,
+        e.table_m, e.table_rad, e.hand_m, e.hand_rad, e.swing_m, e.swing_rad})
     if (!(x >= 0 && x <= 1)) throw Error(ErrorCode::invalid_argument, "expected errors from 0 to 1", "robot");
   if (!(e.swing_period_s > 0 && e.swing_decay_s > 0) || !std::isfinite(e.swing_period_s + e.swing_decay_s))
     throw Error(ErrorCode::invalid_argument, "expected positive times of the swing", "robot");
@@ -221,7 +222,8 @@ std::vector<RigRobot::CableLine> RigRobot::cables_to(const Pose& platform) const
   return lines;
 }
 
-// ---- what outlives the program ----------------------------------------------------------------------------------------
+// ---- what outlives the program
+// ----------------------------------------------------------------------------------------
 
 void RigRobot::remember() const {
   if (options_.memory.empty()) return;
@@ -231,9 +233,9 @@ void RigRobot::remember() const {
   const Eigen::Quaterniond& q = m.commanded.rotation;
   const Vector3d& t = m.commanded.translation;
   text << "rig-robot 1\n"
-       << "stop " << m.stop << "\nvisit " << m.visit << ' ' << m.place << "\nclock " << m.clock_s << ' ' << m.arrived_s << ' ' << m.still_s << ' ' << m.swing
-       << "\nroll " << m.roll_rad << ' ' << m.turned_at << "\npose " << q.w() << ' ' << q.x() << ' ' << q.y() << ' '
-       << q.z() << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << "\nlengths";
+       << "stop " << m.stop << "\nvisit " << m.visit << ' ' << m.place << "\nclock " << m.clock_s << ' ' << m.arrived_s
+       << ' ' << m.still_s << ' ' << m.swing << "\nroll " << m.roll_rad << ' ' << m.turned_at << "\npose " << q.w()
+       << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << "\nlengths";
   for (const double length : m.lengths_m) text << ' ' << length;
   text << '\n';
   for (const auto& [place, n] : m.visits) text << "been " << n << ' ' << place << '\n';

@@ -54,7 +54,8 @@ class Scatter {
       const Eigen::Vector3f out(float(std::cos(angle)), float(std::sin(angle)), 0), across(-out.y(), out.x(), 0);
       RoomHit hit;
       hit.surface = Room::kPanels + panel;
-      hit.point = room.radius * out + float(u) * across + Eigen::Vector3f(0, 0, .5f * (float(random()) + 1) * room.height);
+      hit.point =
+          room.radius * out + float(u) * across + Eigen::Vector3f(0, 0, .5f * (float(random()) + 1) * room.height);
       hit.normal = -out;
       return hit;
     };
@@ -120,7 +121,8 @@ bool overlap(const Pose& a, double width_a, const Pose& b, double width_b) {
   for (const Matrix3d* axes : {&axes_a, &axes_b})
     for (int k = 0; k < 2; ++k) {
       const Vector3d along = axes->col(k);
-      if (std::fabs(apart.dot(along)) > reach(axes_a, width_a, along) + reach(axes_b, width_b, along) + gap) return false;
+      if (std::fabs(apart.dot(along)) > reach(axes_a, width_a, along) + reach(axes_b, width_b, along) + gap)
+        return false;
     }
   return true;
 }
@@ -133,8 +135,7 @@ void hang(RoomTargets& targets, int design, const Pose& world_from_target, const
   const calib::TargetDesign& as_printed = targets.set.designs[std::size_t(design)];
   const std::span<const int> ids = as_printed.family.ids();
   if (targets.placed.size() >= ids.size())
-    throw Error(ErrorCode::invalid_argument, "more sheets than ids: choose fewer or larger ones",
-                "targets");
+    throw Error(ErrorCode::invalid_argument, "more sheets than ids: choose fewer or larger ones", "targets");
   const int id = ids[targets.placed.size()];
   FlatPrint print = print_of(as_printed, id);
   print.world_from_print = world_from_target;

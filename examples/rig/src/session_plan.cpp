@@ -22,8 +22,11 @@ namespace {
 struct Usual {
   double size_m, radius_m;
 };
-const std::map<std::string, Usual, std::less<>> kUsual = {
-    {"snowmobile", {2.8, 2.7}}, {"deer", {1.0, 1.5}}, {"deer_head", {1.0, 1.5}}, {"bust", {.7, 1.5}}, {"statue", {.2, .8}}};
+const std::map<std::string, Usual, std::less<>> kUsual = {{"snowmobile", {2.8, 2.7}},
+                                                          {"deer", {1.0, 1.5}},
+                                                          {"deer_head", {1.0, 1.5}},
+                                                          {"bust", {.7, 1.5}},
+                                                          {"statue", {.2, .8}}};
 
 Usual usual(const std::string& object) {
   const auto known = kUsual.find(object);
@@ -108,7 +111,8 @@ ViewSphere sphere_of(const Plan& plan) {
     if (stop.photograph) {
       const Vector3d eye = stop.cam_from_world.center();
       const double s = std::sin(stop.phi_rad);
-      views.emplace_back(eye, Vector3d(s * std::cos(stop.theta_rad), s * std::sin(stop.theta_rad), std::cos(stop.phi_rad)));
+      views.emplace_back(eye,
+                         Vector3d(s * std::cos(stop.theta_rad), s * std::sin(stop.theta_rad), std::cos(stop.phi_rad)));
     }
   if (views.empty()) throw Error(ErrorCode::bad_input, "photographs nothing", "plan");
   Eigen::MatrixXd a(3 * Eigen::Index(views.size()), 4);

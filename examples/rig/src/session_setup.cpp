@@ -28,7 +28,8 @@ double highest_seen(const std::vector<View>& views, double room_radius) {
   double top = 0;
   for (const View& view : views)
     for (int i = 0; i <= 8; ++i)
-      for (const auto& [x, y] : {std::pair(i / 8., 0.), std::pair(i / 8., 1.), std::pair(0., i / 8.), std::pair(1., i / 8.)}) {
+      for (const auto& [x, y] :
+           {std::pair(i / 8., 0.), std::pair(i / 8., 1.), std::pair(0., i / 8.), std::pair(1., i / 8.)}) {
         const auto ray = view.camera.ray({x * view.camera.width, y * view.camera.height});
         if (!ray) continue;
         const Eigen::Vector3f way = (view.cam_from_world.rotation.conjugate() * *ray).cast<float>();
@@ -53,12 +54,14 @@ void check(const SimulateOptions& o) {
   expect(o.focal_mm >= 1 && o.focal_mm <= 1000, "the focal length must be from 1 to 1000 mm");
   expect(o.distortion >= 0 && o.distortion <= 1, "distortion must be from 0 to 1");
   expect(o.jpeg_quality >= 1 && o.jpeg_quality <= 100, "JPEG quality must be from 1 to 100");
-  expect(o.room_radius_m == 0 || (o.room_radius_m > .05 && o.room_radius_m < 1000), "the room's radius must be from 0.05 to 1000 m");
+  expect(o.room_radius_m == 0 || (o.room_radius_m > .05 && o.room_radius_m < 1000),
+         "the room's radius must be from 0.05 to 1000 m");
   expect(o.radius_m == 0 || (o.radius_m > .01 && o.radius_m < 500), "the radius must be from 0.01 to 500 m");
   expect(o.density > 0 && o.density <= .4, "the sheets' density must be above 0, at most 0.4");
   expect(o.circle_px == 0 || (o.circle_px >= 1 && o.circle_px <= 1000), "circles must be from 1 to 1000 px");
   expect(o.least_targets >= 0 && o.least_targets <= 1000, "least targets must be from 0 to 1000");
-  expect(o.phi_from_rad >= 0 && o.phi_from_rad <= o.phi_to_rad && o.phi_to_rad < 3.2, "polar angles must ascend, from 0 to pi");
+  expect(o.phi_from_rad >= 0 && o.phi_from_rad <= o.phi_to_rad && o.phi_to_rad < 3.2,
+         "polar angles must ascend, from 0 to pi");
 }
 
 RigSession plan_session(const SimulateOptions& o, const std::optional<capture::Plan>& stored, Job& job) {
@@ -100,10 +103,12 @@ RigSession plan_session(const SimulateOptions& o, const std::optional<capture::P
 
   StudioOptions studio;
   double out = 0, top = 0;
-  for (const View& view : views) out = std::max(out, view.center().head<2>().norm()), top = std::max(top, view.center().z());
+  for (const View& view : views)
+    out = std::max(out, view.center().head<2>().norm()), top = std::max(top, view.center().z());
   studio.radius_m = o.room_radius_m > 0 ? o.room_radius_m : std::max(kRoomRadius_m, out + .3);
   const double seen = highest_seen(views, studio.radius_m);
-  studio.height_m = std::max({kLeastHeight_m, std::min(seen + .15, kGreatestHeight_m), top + .3, s.center.z() - floor + .5 * size.height_m + .5});
+  studio.height_m = std::max({kLeastHeight_m, std::min(seen + .15, kGreatestHeight_m), top + .3,
+                              s.center.z() - floor + .5 * size.height_m + .5});
   if (seen > studio.height_m) s.notes.push_back("some photographs look over the panels");
   studio.center_height_m = (s.world_from_plan * s.center).z();
   studio.paint = o.blue ? kBluePaint : kGreenPaint;
@@ -120,13 +125,15 @@ RigSession plan_session(const SimulateOptions& o, const std::optional<capture::P
     const TargetSights sights(s.scene);
     const auto poor = add_sheets(s.targets, views, o.least_targets, sights, mix(o.seed, 7));
     if (s.targets.placed.empty())
-      throw Error(ErrorCode::invalid_argument, "no sheet was hung: choose a larger density or smaller circles", "targets");
+      throw Error(ErrorCode::invalid_argument, "no sheet was hung: choose a larger density or smaller circles",
+                  "targets");
     if (!poor.empty())
       s.notes.push_back(std::to_string(poor.size()) + " of " + std::to_string(views.size()) +
                         " views decode fewer than " + std::to_string(o.least_targets) +
                         " targets, and no free place for more was found");
     s.least_targets = INT_MAX;
-    for (const View& view : views) s.least_targets = std::min(s.least_targets, int(sights.decodable(view, s.targets).size()));
+    for (const View& view : views)
+      s.least_targets = std::min(s.least_targets, int(sights.decodable(view, s.targets).size()));
     s.scene.sheets = s.targets.prints;
   }
   return s;

@@ -26,8 +26,8 @@ std::vector<NamedExposure> exposures_of(const fs::path& folder) {
   return found;
 }
 
-void write_session_truth(const fs::path& folder, const RigSession& session,
-                         const std::vector<NamedExposure>& exposures, Job& job) {
+void write_session_truth(const fs::path& folder, const RigSession& session, const std::vector<NamedExposure>& exposures,
+                         Job& job) {
   const fs::path truth = folder / "truth";
   NamedShots shots;
   for (const NamedExposure& e : exposures) {

@@ -48,15 +48,16 @@ std::string options_json(const SimulateOptions& o) {
   json["photos"] = o.photos, json["carrier"] = int(o.carrier), json["radius_m"] = o.radius_m;
   json["phi_rad"] = {o.phi_from_rad, o.phi_to_rad};
   const RobotErrors& e = o.errors;
-  json["errors"] = {e.departure_m, e.attachment_m, e.offset_m, e.gain,   e.winch_m, e.common_m, e.mount_m,        e.mount_rad,    e.bearing_rad,
-                    e.table_m,     e.table_rad,    e.hand_m,   e.hand_rad, e.swing_m, e.swing_rad, e.swing_period_s, e.swing_decay_s};
+  json["errors"] = {e.departure_m, e.attachment_m, e.offset_m,    e.gain,           e.winch_m,      e.common_m,
+                    e.mount_m,     e.mount_rad,    e.bearing_rad, e.table_m,        e.table_rad,    e.hand_m,
+                    e.hand_rad,    e.swing_m,      e.swing_rad,   e.swing_period_s, e.swing_decay_s};
   json["width"] = o.width, json["focal_mm"] = o.focal_mm, json["distortion"] = o.distortion;
   json["jpeg_quality"] = o.jpeg_quality, json["cables"] = o.cables;
   const LightOptions& l = o.light;
   json["light"] = {l.ambient_rays, l.lamp_rays, l.bounces, l.floor_texels, l.vertex_spacing};
   const PhotoOptions& p = o.photo;
-  json["photo"] = {{"rays", p.rays},           {"edge_rays", p.edge_rays}, {"blur_px", p.blur_px},
-                   {"f_number", p.f_number},   {"focus_m", p.focus_m},     {"exposure", p.exposure},
+  json["photo"] = {{"rays", p.rays},           {"edge_rays", p.edge_rays},   {"blur_px", p.blur_px},
+                   {"f_number", p.f_number},   {"focus_m", p.focus_m},       {"exposure", p.exposure},
                    {"full_well", p.full_well}, {"read_noise", p.read_noise}, {"bayer", p.bayer},
                    {"reduce", p.reduce}};
   json["empty_photos"] = o.empty_photos, json["lens_photos"] = o.lens_photos;
@@ -115,10 +116,12 @@ class Simulation {
     out_.radius_m = session_.radius_m;
     out_.room_radius_m = session_.scene.enclosure.radius;
     out_.notes = session_.notes;
-    const bool exact = !session_.plan.mechanism && (options_.carrier == Carrier::ideal || options_.carrier == Carrier::automatic);
+    const bool exact =
+        !session_.plan.mechanism && (options_.carrier == Carrier::ideal || options_.carrier == Carrier::automatic);
     out_.carrier = session_.plan.mechanism ? "cables" : exact ? "an ideal robot" : session_.plan.robot;
     char text[200];
-    std::snprintf(text, sizeof text, "%s from %.2f m, in a room of %.2f m; %zu sheets, at least %d of them in each view",
+    std::snprintf(text, sizeof text,
+                  "%s from %.2f m, in a room of %.2f m; %zu sheets, at least %d of them in each view",
                   out_.carrier.c_str(), out_.radius_m, out_.room_radius_m, out_.sheets, out_.least_targets);
     say(text);
     for (const std::string& note : session_.notes) say("note: " + note);
@@ -147,7 +150,8 @@ class Simulation {
       o.world_from_plan = session_.world_from_plan;
       o.center = session_.center;
       o.seed = options_.seed;
-      owned.push_back(std::make_unique<RigCamera>(o, [this]() -> const Photographer& { return photographer(); }, robot));
+      owned.push_back(std::make_unique<RigCamera>(
+          o, [this]() -> const Photographer& { return photographer(); }, robot));
       cameras.push_back(owned.back().get());
     }
     capture::SessionOptions o;

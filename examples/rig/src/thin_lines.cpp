@@ -51,7 +51,10 @@ struct Slice {
 class Drawing {
  public:
   Drawing(const LitScene& scene, const View& view)
-      : scene_(scene), view_(view), origin_(view.center()), cover_(view.camera.width, view.camera.height, 1, PixelType::f32) {}
+      : scene_(scene),
+        view_(view),
+        origin_(view.center()),
+        cover_(view.camera.width, view.camera.height, 1, PixelType::f32) {}
 
   /// Whether any of it is in the picture.
   bool add(const ThinLine& line) {
@@ -125,8 +128,10 @@ class Drawing {
     const std::array<Vector2d, 4> corners{a.left, b.left, b.right, a.right};
     Vector2d low = corners[0], high = corners[0];
     for (const Vector2d& c : corners) low = low.cwiseMin(c), high = high.cwiseMax(c);
-    const int x0 = std::max(0, int(std::floor(low.x()))), x1 = std::min(view_.camera.width - 1, int(std::floor(high.x())));
-    const int y0 = std::max(0, int(std::floor(low.y()))), y1 = std::min(view_.camera.height - 1, int(std::floor(high.y())));
+    const int x0 = std::max(0, int(std::floor(low.x()))),
+              x1 = std::min(view_.camera.width - 1, int(std::floor(high.x())));
+    const int y0 = std::max(0, int(std::floor(low.y()))),
+              y1 = std::min(view_.camera.height - 1, int(std::floor(high.y())));
     if (!(high.x() > 0 && high.y() > 0 && low.x() < view_.camera.width && low.y() < view_.camera.height)) return false;
     const double depth = .5 * (a.depth + b.depth);
     for (int y = y0; y <= y1; ++y) {

@@ -25,8 +25,8 @@ struct LightOptions {
 
 /// A cable or the like: a cylinder that is dark, thin, and throws no shadow.
 struct ThinLine {
-  Eigen::Vector3d from, to;  ///< world, m
-  float radius = .001f;      ///< m
+  Eigen::Vector3d from, to;                    ///< world, m
+  float radius = .001f;                        ///< m
   Eigen::Vector3f color{.012f, .012f, .013f};  ///< radiance
 };
 
@@ -44,7 +44,7 @@ struct PhotoOptions {
   double read_noise = 9;                     ///< electrons
   bool bayer = false;                        ///< the sensor sees one colour a pixel (RGGB), demosaiced bilinearly
   bool depth = false;                        ///< fill Photo::depth
-  std::vector<ThinLine> lines;                ///< objects hide them; masks don't know of them
+  std::vector<ThinLine> lines;               ///< objects hide them; masks don't know of them
   int reduce = 1;  ///< > 1: light is traced at 1/reduce of the size and enlarged bicubically; noise at full size
 };
 

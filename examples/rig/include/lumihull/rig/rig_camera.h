@@ -16,7 +16,7 @@ namespace lumihull::rig {
 
 /// Lens, sensor and file of the virtual camera.
 struct RigLens {
-  Camera camera;  ///< as it really is
+  Camera camera;                                                         ///< as it really is
   double focal_mm = kFocalLength_mm, sensor_width_mm = kSensorWidth_mm;  ///< as the maker says
   int jpeg_quality = 93;
   PhotoOptions photo;
@@ -30,9 +30,9 @@ std::string camera_file(const Image& picture, const RigLens& lens, double time_s
 /// A camera on a RigRobot: photographs what is before it where it really is, its swing during the exposure included.
 ///
 /// The truth of each exposure is written into `truth`/exposures before its file is delivered: NUMBER.json
-/// ("lumihull-exposure": name of the stop, camera, time, exposure, cam_from_world, swing, digest), NUMBER.png (mask), and on
-/// request NUMBER.depth. These are also the camera's own list: a shot that was killed and is not on it was not made;
-/// one that is, is delivered again, the same to the byte.
+/// ("lumihull-exposure": name of the stop, camera, time, exposure, cam_from_world, swing, digest), NUMBER.png (mask),
+/// and on request NUMBER.depth. These are also the camera's own list: a shot that was killed and is not on it was not
+/// made; one that is, is delivered again, the same to the byte.
 class RigCamera : public capture::CameraDevice {
  public:
   struct Options {
@@ -40,11 +40,11 @@ class RigCamera : public capture::CameraDevice {
     RigLens lens;
     std::filesystem::path truth;  ///< a folder
     bool masks = true;
-    bool depth = false;          ///< as NUMBER.depth: width x height floats, little-endian, row by row, m
-    bool cables = true;          ///< they may cross the picture
-    Pose world_from_plan;        ///< the scene's world
+    bool depth = false;               ///< as NUMBER.depth: width x height floats, little-endian, row by row, m
+    bool cables = true;               ///< they may cross the picture
+    Pose world_from_plan;             ///< the scene's world
     Eigen::Vector3d center{0, 0, 0};  ///< of the views, in the plan's world
-    std::uint64_t seed = 1;      ///< of the sensor's noise
+    std::uint64_t seed = 1;           ///< of the sensor's noise
   };
   /// photographer: asked for when the first photograph is taken; it and the robot outlive the camera.
   RigCamera(const Options& options, std::function<const Photographer&()> photographer, RigRobot& robot);
@@ -70,9 +70,9 @@ struct ExposureRecord {
   capture::ShotId id = 0;
   std::string camera, stop, sha256, file;
   double time_s = 0, exposure_s = 0;
-  double sway_px = 0;    ///< the longest way of an image point during the exposure
-  Pose cam_from_world;        ///< the mean of the exposure
-  std::vector<Pose> during;   ///< equally spaced moments of it; empty: it stood still
+  double sway_px = 0;        ///< the longest way of an image point during the exposure
+  Pose cam_from_world;       ///< the mean of the exposure
+  std::vector<Pose> during;  ///< equally spaced moments of it; empty: it stood still
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> cables;  ///< ends, m
 };
 /// Of `truth`/exposures, by number. Errors: bad_input (file, expectation), io.

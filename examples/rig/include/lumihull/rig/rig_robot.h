@@ -18,12 +18,12 @@ namespace lumihull::rig {
 /// (fig. 8: less than a pixel after 7 s).
 struct RobotErrors {
   // ---- cables
-  double departure_m = .003;   ///< of each coordinate of a departure point, for good
-  double attachment_m = .0005; ///< of each coordinate of an attachment, for good
-  double offset_m = .002;      ///< of each winch's zero, for good
-  double gain = .0003;         ///< of each drum's circumference, for good
-  double winch_m = .005;       ///< of each cable's length, anew at each arrival
-  double common_m = .009;      ///< of all lengths together (warmth, voltage), anew at each arrival: up and down
+  double departure_m = .003;    ///< of each coordinate of a departure point, for good
+  double attachment_m = .0005;  ///< of each coordinate of an attachment, for good
+  double offset_m = .002;       ///< of each winch's zero, for good
+  double gain = .0003;          ///< of each drum's circumference, for good
+  double winch_m = .005;        ///< of each cable's length, anew at each arrival
+  double common_m = .009;       ///< of all lengths together (warmth, voltage), anew at each arrival: up and down
   double mount_m = .002, mount_rad = .004;  ///< of the camera on the platform, for good
   double bearing_rad = .005;                ///< where the bearing locks, anew at each turn
   // ---- turntables and hands
@@ -84,7 +84,8 @@ class RigRobot : public capture::Robot {
     Pose cam_from_world;
     std::vector<CableLine> cables;
   };
-  /// Where the robot will be, at rest, when it comes to a stop's place for the nth time; the bearing's own error is not in it.
+  /// Where the robot will be, at rest, when it comes to a stop's place for the nth time; the bearing's own error is not
+  /// in it.
   Standing foreseen(const capture::PlannedStop& stop, int visit = 1) const;
 
   /// Where the true cables are at a time; none without a mechanism.
@@ -99,10 +100,10 @@ class RigRobot : public capture::Robot {
     std::vector<double> lengths_m;
     double clock_s = 0, arrived_s = 0, still_s = 0, swing = 0;
     double roll_rad = 0;
-    std::string turned_at;  ///< where the bearing was last turned
+    std::string turned_at;    ///< where the bearing was last turned
     std::uint64_t place = 0;  ///< what these lengths are known by; without a mechanism the stop's name
     int visit = 0;            ///< of the place, from 1
-    Pose commanded;  ///< of the platform; without a mechanism of the camera
+    Pose commanded;           ///< of the platform; without a mechanism of the camera
     std::map<std::uint64_t, int> visits;
   };
   std::uint64_t place_of(const capture::PlannedStop& stop) const;

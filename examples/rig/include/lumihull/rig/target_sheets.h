@@ -32,9 +32,9 @@ struct TargetSheetOptions {
   std::uint64_t seed = 1;
 };
 
-/// Scatters sheets with a target of matrix6x6 each at random over walls and floor: small ones around the object, large ones on
-/// walls, so that cameras on a hemisphere of radius `distance` (m) around the scene's centre see enough of them all
-/// around (paper, 3.1: at least five in each picture). Dark green on light green, in the enclosure's own hue.
+/// Scatters sheets with a target of matrix6x6 each at random over walls and floor: small ones around the object, large
+/// ones on walls, so that cameras on a hemisphere of radius `distance` (m) around the scene's centre see enough of them
+/// all around (paper, 3.1: at least five in each picture). Dark green on light green, in the enclosure's own hue.
 /// Errors: invalid_argument (options; more sheets than the family has ids).
 RoomTargets scatter_targets(const Scene& scene, const Camera& camera, double distance,
                             const TargetSheetOptions& options);
@@ -42,7 +42,7 @@ RoomTargets scatter_targets(const Scene& scene, const Camera& camera, double dis
 /// What counts as a target that can be decoded in a photograph: all of its circles are in the picture, none smaller
 /// than this, nothing in front of it.
 struct TargetReach {
-  double border = .02;          ///< of the picture's width, on each side, that counts as outside
+  double border = .02;           ///< of the picture's width, on each side, that counts as outside
   double least_circle_px = 5.5;  ///< minor axis; the detector looks for 4.5 px
 };
 
