@@ -85,9 +85,16 @@ TEST(AnimatedPng, HoldsItsFrames) {
   for (std::size_t at = 8; at + 12 <= film.size(); at += 12 + number(at)) {
     const std::string name = film.substr(at + 4, 4);
     if (name == "acTL") frames_told = number(at + 8) == 3;
-    if (name == "fcTL") ++frame, EXPECT_EQ(number(at + 8), sequence++), EXPECT_EQ(number(at + 12), 37u);
-    if (name == "fdAT")
-      EXPECT_EQ(number(at + 8), sequence++), data[std::size_t(frame)] += film.substr(at + 12, number(at) - 4);
+    if (name == "fcTL") {
+      ++frame;
+      EXPECT_EQ(number(at + 8), sequence++);
+      EXPECT_EQ(number(at + 12), 37u);
+    }
+    if (name == "fdAT") {
+      ASSERT_GE(frame, 0);
+      EXPECT_EQ(number(at + 8), sequence++);
+      data[std::size_t(frame)] += film.substr(at + 12, number(at) - 4);
+    }
     if (name == "IDAT") data[0] += film.substr(at + 8, number(at));
   }
   EXPECT_TRUE(frames_told);
