@@ -158,7 +158,8 @@ void write_report(const Capture& capture, const ReportOptions& options, Job& job
   for (const std::string& note : capture.notes) page += "<p class=\"dim\">" + html_escaped(note) + "</p>\n";
   if (has_light_field)
     add_light_field(page, light_field, positioned_views(capture), around(options.turntable_frames), job);
-  if (options.evaluation && options.evaluation->photos_held_out) add_evaluation(page, capture, *options.evaluation, job);
+  if (const auto& e = options.evaluation; e && (e->photos_held_out > 0 || e->test_views.views > 0))
+    add_evaluation(page, capture, *e, job);
   if (has_model) add_model(page, capture, options.turntable_frames, model, job);
   if (has_hull) add_hull(page, capture, job);
   if (!capture.shots.empty()) add_photographs(page, capture, job);

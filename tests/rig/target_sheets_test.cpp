@@ -39,7 +39,7 @@ TEST(TargetSheets, AreFoundWhereTheyHang) {
   PhotoOptions options;
   options.blur_px = .7;
   double sum = 0;
-  int points = 0;
+  int points = 0, disturbed = 0;
   for (const Pose& pose : hemisphere_trajectory(6, room.around)) {
     const View view{room.camera, pose};
     const Photo photo = photographer.photograph(view, options, 3, job);
@@ -60,13 +60,19 @@ TEST(TargetSheets, AreFoundWhereTheyHang) {
         circle.radius = design.circle_radius_m();
         const auto truth = calib::projected_circle_center(room.camera, circle);
         ASSERT_TRUE(truth.has_value());
-        EXPECT_LT((f.pixel - *truth).norm(), .2) << "target " << d.id << ", circle " << f.index;
-        sum += (f.pixel - *truth).squaredNorm();
+        const double off = (f.pixel - *truth).norm();
+        EXPECT_LT(off, .5) << "target " << d.id << ", circle " << f.index;
+        if (off > .2) {  // the object's outline crosses it
+          ++disturbed;
+          continue;
+        }
+        sum += off * off;
         ++points;
       }
     }
   }
   ASSERT_GT(points, 500);
+  EXPECT_LE(disturbed * 500, points);
   EXPECT_LT(std::sqrt(sum / points), .03);
 }
 
