@@ -8,6 +8,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "repaint.h"
 #include "support.h"
 
 namespace lumihull::rig {
@@ -210,6 +211,21 @@ TEST(Shapes, ARealTexturedMeshIsRead) {
   EXPECT_EQ(object.uv.size(), object.mesh.triangles.size());
   EXPECT_EQ(object.texture.channels(), 3);
   EXPECT_EQ(euler_characteristic(object.mesh), 2);
+}
+
+// What a session is told of an object's looks holds for each of its materials.
+TEST(Shapes, RepaintedAllOver) {
+  Object object = make_box(1);
+  object.others = {object.material, object.material};
+  object.material.reflectance = .04f, object.others[0].reflectance = .5f, object.others[1].reflectance = .9f;
+  const Object matt = repainted(object, {.matt = true});
+  ASSERT_EQ(matt.others.size(), 2u);
+  EXPECT_EQ(matt.material.reflectance + matt.others[0].reflectance + matt.others[1].reflectance, 0);
+  const Object unlit = repainted(object, {.unlit = std::array<std::uint8_t, 3>{255, 0, 0}, .exposure = 2});
+  EXPECT_TRUE(unlit.others.empty() && unlit.material.unlit);
+  EXPECT_FLOAT_EQ(unlit.material.colors[0][0], .5f);
+  const Object uniform = repainted(object, {.uniform = true});
+  EXPECT_TRUE(uniform.others.empty() && uniform.material.pattern == Pattern::plain);
 }
 
 }  // namespace

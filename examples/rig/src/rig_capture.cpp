@@ -11,6 +11,7 @@
 #include <cstdio>
 
 #include "noise.h"
+#include "repaint.h"
 #include "truth.h"
 
 namespace lumihull::rig {
@@ -38,25 +39,7 @@ struct Session {
 };
 
 Object object_of(const RigOptions& o) {
-  Object object = object_by_name(o.object, o.size_m);
-  Material& m = object.material;
-  if (o.unlit || o.uniform) object.material_at = nullptr, object.material_of.clear(), object.others.clear();
-  if (o.matt) {
-    m.reflectance = 0;
-    for (Material& other : object.others) other.reflectance = 0;
-  }
-  if (o.unlit) {
-    for (int c = 0; c < 3; ++c)
-      m.colors[0][c] = linear_from_srgb(float((*o.unlit)[std::size_t(c)]) / 255) / float(o.photo.exposure);
-    m.unlit = true;
-  }
-  if (o.uniform) {
-    m.pattern = Pattern::plain;
-    m.grain = 0;
-    object.texture = Image();
-    object.uv.clear();
-  }
-  return object;
+  return repainted(object_by_name(o.object, o.size_m), {o.matt, o.uniform, o.unlit, o.photo.exposure});
 }
 
 Session plan(const RigOptions& o) {

@@ -11,6 +11,8 @@
 #include <map>
 #include <numbers>
 
+#include "repaint.h"
+
 namespace lumihull::rig {
 
 using namespace capture;
@@ -80,21 +82,8 @@ Mechanism mechanism_on_floor() {
 }  // namespace
 
 Object session_object(const SimulateOptions& o) {
-  Object object = object_by_name(o.object, o.size_m > 0 ? o.size_m : usual(o.object).size_m);
-  Material& m = object.material;
-  if (o.matt) m.reflectance = 0;
-  if (o.unlit) {
-    for (int c = 0; c < 3; ++c)
-      m.colors[0][c] = linear_from_srgb(float((*o.unlit)[std::size_t(c)]) / 255) / float(o.photo.exposure);
-    m.unlit = true;
-  }
-  if (o.uniform) {
-    m.pattern = Pattern::plain;
-    m.grain = 0;
-    object.texture = Image();
-    object.uv.clear();
-  }
-  return object;
+  return repainted(object_by_name(o.object, o.size_m > 0 ? o.size_m : usual(o.object).size_m),
+                   {o.matt, o.uniform, o.unlit, o.photo.exposure});
 }
 
 ObjectSize size_of(const hull::Mesh& mesh) {
