@@ -236,14 +236,17 @@ TEST_F(GphotoCamera, NamesFromTheCameraGoNowhere) {
     EXPECT_THAT(entry.path().filename().string(), testing::StartsWith("shot-00000"));
 }
 
-TEST_F(GphotoCamera, ALostCameraIsRefusedThenAnError) {
+TEST_F(GphotoCamera, ALostCameraRefusesUntilItIsBack) {
   const auto device = open_gphoto_camera(options(), job);
   camera.set_fault(Fault::die_in_capture);
   EXPECT_EQ(device->shoot(1, 0, folder.path(), job).state, ShotState::unknown);
   camera.refuse_connections(true);
-  EXPECT_EQ(device->shoot(2, 0, folder.path(), job).state, ShotState::refused);
-  EXPECT_EQ(device->shoot(2, 0, folder.path(), job).state, ShotState::refused);
-  EXPECT_EQ(test::expect_error([&] { device->shoot(2, 0, folder.path(), job); }).code(), ErrorCode::io);
+  for (int i = 0; i < 4; ++i) {
+    const ShotOutcome outcome = device->shoot(2, 0, folder.path(), job);
+    EXPECT_EQ(outcome.state, ShotState::refused);
+    EXPECT_THAT(outcome.detail, testing::HasSubstr(camera.gphoto_port()));
+    EXPECT_EQ(device->recall(2).state, ShotState::refused);
+  }
   camera.refuse_connections(false);
   camera.set_fault(Fault::none);
   EXPECT_EQ(device->shoot(2, 0, folder.path(), job).state, ShotState::done);

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <lumihull/capture/trajectory.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -92,6 +93,23 @@ std::vector<TrueShot> true_shots(const std::vector<SimulatedEvent>& log, std::si
     }
   }
   return shots;
+}
+
+capture::Plan short_hops() {
+  capture::Plan plan;
+  plan.robot = "cables";
+  plan.mechanism = capture::paper_mechanism();
+  plan.cameras = {"main"};
+  for (int i = 0; i < 6; ++i) {
+    const Pose pose{Eigen::Quaterniond::Identity(), {0.04 * i, 0.02 * (i % 2), 1.5}};
+    capture::PlannedStop stop = capture::platform_stop(*plan.mechanism, Eigen::Vector3d::Zero(), pose, 0);
+    stop.name = "s" + std::to_string(i);
+    stop.travel_s = i > 0 ? 1 : 0;
+    stop.settle_s = 0;
+    stop.exposure_s = 0.05;
+    plan.stops.push_back(stop);
+  }
+  return plan;
 }
 
 }  // namespace lumihull::test

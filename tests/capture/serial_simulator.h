@@ -2,6 +2,7 @@
 
 // The firmware's simulator as a child process, and the truth that it writes down.
 
+#include <lumihull/capture/plan.h>
 #include <sys/types.h>
 
 #include <cstdint>
@@ -49,5 +50,8 @@ struct TrueShot {
 };
 /// Index = shot number.
 std::vector<TrueShot> true_shots(const std::vector<SimulatedEvent>& log, std::size_t count);
+
+/// Six photographs a hand's breadth apart, so that winches are quick: of the paper's mechanism.
+capture::Plan short_hops();
 
 }  // namespace lumihull::test

@@ -165,8 +165,6 @@ class GphotoCamera final : public CameraDevice {
   void make_safe() noexcept override { helper_.reset(); }
 
  private:
-  static constexpr int kMostFailures = 3;
-
   /// Connected, and with no event of an earlier exposure waiting: else a late picture would be taken for this shot's.
   std::string make_ready() {
     for (int attempt = 0; attempt < 2; ++attempt) {
@@ -175,14 +173,12 @@ class GphotoCamera final : public CameraDevice {
         helper_->ask("drain");
         const Words w = helper_->answer(after(kShortAnswer_s));
         if (w[0] != "ok") throw HelperLost{w.size() > 1 ? w[1] : "no reason given"};
-        failures_ = 0;
         return {};
       } catch (const HelperLost& lost) {
         helper_.reset();
         if (attempt == 1) return "the camera is not ready: " + lost.why;
       } catch (const Error& e) {
-        if (++failures_ >= kMostFailures || e.code() != ErrorCode::io) throw;
-        return e.message();
+        return e.what();  // nothing was released: a refusal, not an error that would leave the shot in doubt
       }
     }
     return {};
@@ -309,7 +305,6 @@ class GphotoCamera final : public CameraDevice {
   fs::path program_;
   std::unique_ptr<Helper> helper_;
   std::map<ShotId, ShotOutcome> outcomes_;
-  int failures_ = 0;
 };
 
 void check_seconds(double value, const char* name) {

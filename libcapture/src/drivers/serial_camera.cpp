@@ -94,6 +94,11 @@ ShotOutcome SerialCamera::fire(ShotId id, double exposure_s) {
   Bytes payload;
   append_u32(payload, id);
   append_u32(payload, std::uint32_t(std::max(1LL, std::llround(exposure_s * 1e3))));
+  try {
+    link_->check();
+  } catch (const Error& e) {
+    return {ShotState::refused, {}, e.what()};  // nothing was said: a refusal leaves no doubt
+  }
   Attempt& attempt = attempts_[id];
   attempt.outcome = {
       ShotState::unknown, {}, "the serial port was lost meanwhile"};  // stays, where the next line throws

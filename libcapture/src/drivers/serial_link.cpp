@@ -92,6 +92,11 @@ SerialLink::Controller SerialLink::controller() const {
   return controller_;
 }
 
+void SerialLink::check() const {
+  const std::lock_guard lock(mutex_);
+  check_port();
+}
+
 void SerialLink::check_port() const {
   if (lost_) std::rethrow_exception(lost_);
 }

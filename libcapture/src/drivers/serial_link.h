@@ -62,6 +62,9 @@ class SerialLink {
   };
   Controller controller() const;
 
+  /// Error{io}: the port is gone.
+  void check() const;
+
   /// In the controller's seconds.
   void sleep(double seconds) const { std::this_thread::sleep_for(scaled(seconds)); }
   const std::string& device() const { return port_.device(); }

@@ -32,7 +32,7 @@ struct GphotoOptions {
 /// picture was taken and stays on the card (download failed; more pictures came than one exposure makes, so that none
 /// can be told to be its); `unknown` where the camera fell silent after the release. A number that was `done` or
 /// `unknown` is never exposed again: its outcome is given once more. After the release `Job::cancel` waits for the
-/// outcome. It throws Error{io} after three failures to connect in a row.
+/// outcome. A camera that is lost is `refused` until it is back.
 ///
 /// Errors: not_found (no helper program), invalid_argument, io (no such camera, it can't be opened), cancelled.
 LUMIHULL_API std::unique_ptr<CameraDevice> open_gphoto_camera(const GphotoOptions& options, Job& job);

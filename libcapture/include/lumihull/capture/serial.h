@@ -48,7 +48,8 @@ LUMIHULL_API std::unique_ptr<Robot> open_serial_robot(std::shared_ptr<SerialLink
 
 /// The shutter's contact: files stay in the camera. A shot number is fired at most once; of one whose fate is in doubt
 /// (`unknown`), this object refuses to fire the number again. The outcome `unknown` also stands for an exposure that
-/// was cut short. Throws Error{io} where the port is gone, Error{cancelled} only before anything was fired.
+/// was cut short. A port that was lost before is `refused`; Error{io} where it is lost meanwhile; Error{cancelled} only
+/// before anything was fired.
 LUMIHULL_API std::unique_ptr<CameraDevice> open_serial_camera(std::shared_ptr<SerialLink> link);
 
 }  // namespace lumihull::capture
