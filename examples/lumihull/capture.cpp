@@ -5,6 +5,7 @@
 #include <lumihull/calib/lens_calibration.h>
 #include <lumihull/capture/devices.h>
 #include <lumihull/capture/session.h>
+#include <lumihull/rig/rig_devices.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -77,8 +78,11 @@ void run(Program& program, Arguments& a) {
   options.devices = "robot " + a.robot + "; cameras";
   for (const std::string& word : a.cameras) options.devices += " " + word;
 
-  TerminalOperator who([&](const std::string& line) { program.say(line); }, a.yes, program.job());
+  const auto say = [&](const std::string& line) { program.say(line); };
+  TerminalOperator who(say, a.yes, program.job());
+  rig::RigDevices rig(a.folder, a.dry_run, say);
   capture::Devices devices(a.folder, who);
+  devices.bring("rig", rig.brought(program.job()));
   const auto robot = devices.robot(a.robot, plan);
   std::vector<std::unique_ptr<capture::CameraDevice>> owned;
   std::vector<capture::CameraDevice*> cameras;
@@ -87,9 +91,11 @@ void run(Program& program, Arguments& a) {
     owned.push_back(devices.camera(a.cameras[i], name, *robot, program.job()));
     cameras.push_back(owned.back().get());
   }
+  options.settle = rig.settle();
   if (a.dry_run) return say_dry_run(program, capture::dry_run(plan, *robot, cameras, a.folder, options));
 
   const capture::SessionResult result = capture::capture(plan, *robot, cameras, a.folder, options, who, program.job());
+  rig.write_truth(program.job());
   program.say(a.folder + ": " + std::to_string(result.views) + " of " + std::to_string(result.of) + " photographs, " +
               std::to_string(result.taken) + " taken now" +
               (result.awaited ? ", " + std::to_string(result.awaited) + " still on the camera's card" : "") +
@@ -108,10 +114,11 @@ void add_capture(Program& program) {
                                 [&program, a] { run(program, *a); });
   verb->add_option("capture", a->folder, "folder of the capture, new or begun")->required();
   verb->add_option("--plan", a->plan, "what `lumihull plan` wrote; a capture that was begun has it");
-  verb->add_option("--robot", a->robot, "simulate, turntable, hand, or serial:PORT")->required();
+  verb->add_option("--robot", a->robot, "simulate, turntable, hand, serial:PORT, or rig")->required();
   verb->add_option(
           "--camera", a->cameras,
-          "simulate, hand, serial[:PORT], gphoto2[:PORT], or folder:DIR; once for all, or once for each of the plan")
+          "simulate, hand, serial[:PORT], gphoto2[:PORT], folder:DIR, or rig[:OBJECT[:WIDTH]], the virtual rig's; once "
+          "for all, or once for each of the plan")
       ->required();
   verb->add_flag("--dry-run", a->dry_run, "check everything, move nothing");
   verb->add_option("--retake", a->options.retake, "photograph this stop once more, and nothing else");

@@ -70,6 +70,36 @@ TEST(Devices, SayWhatIsMissing) {
             ErrorCode::not_found);
 }
 
+TEST(Devices, AProgramBringsItsOwn) {
+  const test::TemporaryFolder place;
+  test::ScriptedOperator who;
+  Devices devices(place / "c", who);
+  Job job;
+  const Plan plan = test::turntable_plan(2);
+  std::vector<std::string> whats;
+  BroughtDevices own;
+  own.robot_usage = "mine[:WHICH]", own.camera_usage = "mine";
+  own.robot = [&](const std::string& what, const Plan&) {
+    whats.push_back(what);
+    return std::make_unique<SimulatedRobot>(SimulatedRobot::Options{.memory = {}});
+  };
+  own.camera = [&](const std::string& what, const std::string& name, const Robot&) -> std::unique_ptr<CameraDevice> {
+    throw Error(ErrorCode::invalid_argument, "can't take " + name, what);
+  };
+  EXPECT_EQ(test::expect_error([&] { devices.robot("mine", plan); }).code(), ErrorCode::invalid_argument);
+  devices.bring("mine", own);
+  const auto robot = devices.robot("mine", plan);
+  devices.robot("mine:left:2", plan);
+  EXPECT_EQ(whats, (std::vector<std::string>{"", "left:2"}));
+  EXPECT_THAT(test::expect_error([&] { devices.camera("mine:x", "main", *robot, job); }).message(),
+              HasSubstr("can't take main"));
+  for (const char* word : {"mine:", "yours"})
+    EXPECT_THAT(test::expect_error([&] { devices.robot(word, plan); }).message(),
+                HasSubstr("serial:PORT, mine[:WHICH]"));
+  EXPECT_THAT(test::expect_error([&] { devices.camera("yours", "main", *robot, job); }).message(),
+              HasSubstr("folder:DIR, mine"));
+}
+
 TEST(Devices, AFolderCamerasPictureIsAskedFor) {
   const test::TemporaryFolder place;
   std::filesystem::create_directories(place / "in");

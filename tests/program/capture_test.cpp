@@ -3,7 +3,7 @@
 #include <lumihull/base/files.h>
 #include <lumihull/capture/serial.h>
 #include <lumihull/capture/session.h>
-#include <lumihull/capture/trajectory.h>
+#include <lumihull/rig/rig_camera.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -96,9 +96,14 @@ TEST_F(CaptureVerb, WrongWordsAreErrors) {
     return lumihull({"capture", mine("cap"), "--plan", mine("plan.json"), "--robot", robot, "--camera", camera, "--yes",
                      "--quiet"});
   };
-  EXPECT_THAT(with("levitation", "simulate").err, HasSubstr("expected simulate, turntable, hand or serial:PORT"));
-  EXPECT_THAT(with("simulate", "eye").err, HasSubstr("expected simulate, hand, serial"));
+  EXPECT_THAT(with("levitation", "simulate").err,
+              HasSubstr("expected one of simulate, turntable, hand, serial:PORT, rig"));
+  EXPECT_THAT(with("simulate", "eye").err, HasSubstr("folder:DIR, rig[:OBJECT[:WIDTH]]"));
   EXPECT_THAT(with("simulate", "serial").err, HasSubstr("has no serial port"));
+  EXPECT_THAT(with("simulate", "rig").err, HasSubstr("--robot rig"));
+  EXPECT_THAT(with("rig:vase", "rig").err, HasSubstr("the camera's word"));
+  EXPECT_THAT(with("rig", "rig:dragon").err, HasSubstr("dragon"));
+  EXPECT_THAT(with("rig", "rig:vase:3").err, HasSubstr("width"));
   EXPECT_THAT(with("simulate", "folder:" + mine("nowhere")).err, HasSubstr("nowhere"));
   const auto unplugged = with("serial:" + mine("tty"), "serial");
   EXPECT_EQ(unplugged.status, 1);
@@ -108,27 +113,63 @@ TEST_F(CaptureVerb, WrongWordsAreErrors) {
   EXPECT_THAT(no_plan.err, HasSubstr("--plan"));
 }
 
-/// Stops a hand's breadth apart, so that winches are quick.
-capture::Plan short_hops() {
-  capture::Plan plan;
-  plan.robot = "cables";
-  plan.mechanism = capture::paper_mechanism();
-  plan.cameras = {"main"};
-  for (int i = 0; i < 6; ++i) {
-    const Pose pose{Eigen::Quaterniond::Identity(), {0.04 * i, 0.02 * (i % 2), 1.5}};
-    capture::PlannedStop stop = capture::platform_stop(*plan.mechanism, Eigen::Vector3d::Zero(), pose, 0);
-    stop.name = "s" + std::to_string(i);
-    stop.travel_s = i > 0 ? 1 : 0;
-    stop.settle_s = 0;
-    stop.exposure_s = 0.05;
-    plan.stops.push_back(stop);
+/// Rehearsed with pictures: killed, gone on with, a stop taken once more, and calibrated by the sheets in them.
+TEST_F(CaptureVerb, RehearsesWithTheVirtualRig) {
+  const auto planned = lumihull({"plan", "--object-diameter", "0.4", "--radius", "1.5", "--steps", "8x1", "--phi",
+                                 "60..60", "--kicks", "10", "--quiet", "--json", "-o", mine("ring.json")});
+  ASSERT_EQ(planned.status, 0) << planned.err;
+  ASSERT_EQ(nlohmann::json::parse(planned.out)["photographs"], 8);
+  const auto rig = [&](const std::string& camera, std::vector<std::string> more, double kill_after_s = 0) {
+    std::vector<std::string> words{"capture", mine("cap"), "--plan", mine("ring.json"), "--robot",
+                                   "rig",     "--camera",  camera,   "--quiet",         "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return lumihull(words, {.kill_after_s = kill_after_s});
+  };
+  const auto dry = rig("rig:box:1000", {"--dry-run"});
+  ASSERT_EQ(dry.status, 0) << dry.err;
+  EXPECT_EQ(nlohmann::json::parse(dry.out)["left"], 8);
+  EXPECT_FALSE(std::filesystem::exists(mine("cap")));
+
+  std::size_t kills = 0;
+  test::Outcome outcome;
+  for (int run = 0; run < 40; ++run) {
+    outcome = rig("rig:box:1000", {"--yes"}, 1 + .5 * run);
+    if (outcome.status != 128 + 9) break;
+    ++kills;
   }
-  return plan;
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_GT(kills, 0u);
+  EXPECT_EQ(files(), 8u);
+  const std::string stop = capture::read_plan(mine("ring.json")).stops.back().name;
+  const auto retaken = rig("rig:box:1000", {"--yes", "--retake", stop});
+  ASSERT_EQ(retaken.status, 0) << retaken.err;
+  EXPECT_EQ(files(), 9u);
+
+  const Capture made = Capture::open(mine("cap"));
+  ASSERT_EQ(made.shots.size(), 8u);
+  EXPECT_THAT(made.shots.back().file, HasSubstr(stop + "-camera~2.jpg"));
+  for (const Shot& shot : made.shots) EXPECT_EQ(sha256_of_file(made.photo_path(shot)), shot.stamp.sha256) << shot.name;
+  const auto calibrated = lumihull({"calibrate", mine("cap"), "--targets", mine("cap/sheets.json"), "--quiet"});
+  ASSERT_EQ(calibrated.status, 0) << calibrated.err;
+  const Capture placed = Capture::open(mine("cap"));
+  std::vector<Eigen::Vector3d> found, real;
+  for (const Shot& shot : placed.shots) {
+    ASSERT_TRUE(shot.cam_from_world) << shot.name;
+    const auto truth = rig::read_exposure(mine("cap/truth"), shot.commanded->id);
+    ASSERT_TRUE(truth) << shot.name;
+    EXPECT_EQ(truth->sha256, shot.stamp.sha256);
+    found.push_back(shot.cam_from_world->center());
+    real.push_back(truth->cam_from_world.center());
+  }
+  for (std::size_t i = 1; i < real.size(); ++i)
+    EXPECT_NEAR((found[i] - found[0]).norm(), (real[i] - real[0]).norm(), .005) << placed.shots[i].name;
+
+  EXPECT_THAT(rig("rig:vase:1000", {"--yes"}).err, HasSubstr("another object"));
 }
 
 TEST_F(CaptureVerb, DrivesTheFirmwareAndGoesOnAfterKills) {
   const test::SerialSimulator simulator({"--speed", "2"});
-  const capture::Plan plan = short_hops();
+  const capture::Plan plan = test::short_hops();
   capture::write_plan(plan, mine("hops.json"));
   const auto run = [&](std::vector<std::string> more, double kill_after_s) {
     std::vector<std::string> words{

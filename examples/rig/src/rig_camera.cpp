@@ -105,7 +105,6 @@ struct RigCamera::Exposure {
 RigCamera::RigCamera(const Options& options, std::function<const Photographer&()> photographer, RigRobot& robot)
     : options_(options), photographer_(std::move(photographer)), robot_(robot) {
   options_.lens.camera.validate();
-  fs::create_directories(options_.truth / "exposures");
 }
 
 fs::path RigCamera::record(ShotId id, const char* extension) const {
@@ -144,8 +143,9 @@ ShotOutcome RigCamera::shoot(ShotId id, double exposure_s, const fs::path& folde
     for (const RigRobot::CableLine& line : robot_.cables(e.time_s + exposure_s / 2))
       e.cables.push_back({options_.world_from_plan * line.departure, options_.world_from_plan * line.end,
                           kCableRadius_m, kCableColor});
+  fs::create_directories(options_.truth / "exposures");
   const std::string bytes = develop(e, job);
-  const fs::path place = folder / ("IMG_" + std::to_string(id) + ".jpg");
+  const fs::path place = fs::absolute(folder) / ("IMG_" + std::to_string(id) + ".jpg");
 
   Json json{{"format", "lumihull-exposure"}, {"version", 1}};
   json["shot"] = id;

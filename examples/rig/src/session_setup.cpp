@@ -64,6 +64,27 @@ void check(const SimulateOptions& o) {
          "polar angles must ascend, from 0 to pi");
 }
 
+RobotErrors errors_of(const SimulateOptions& o, const capture::Plan& plan) {
+  const bool exact = !plan.mechanism && (o.carrier == Carrier::ideal || o.carrier == Carrier::automatic);
+  RobotErrors errors = exact ? RobotErrors::none() : o.errors;
+  errors.seed = mix(o.seed, 6);
+  return errors;
+}
+
+RigCamera::Options camera_of(const SimulateOptions& o, const RigSession& session, const std::string& name,
+                             const std::filesystem::path& truth) {
+  RigCamera::Options camera;
+  camera.name = name;
+  camera.lens = session.lens;
+  camera.truth = truth;
+  camera.depth = o.depth;
+  camera.cables = o.cables;
+  camera.world_from_plan = session.world_from_plan;
+  camera.center = session.center;
+  camera.seed = o.seed;
+  return camera;
+}
+
 RigSession plan_session(const SimulateOptions& o, const std::optional<capture::Plan>& stored, Job& job) {
   check(o);
   RigSession s;
@@ -88,12 +109,7 @@ RigSession plan_session(const SimulateOptions& o, const std::optional<capture::P
   const double floor = s.plan.mechanism ? s.plan.mechanism->room.min().z() : s.center.z() - height;
   s.world_from_plan.translation = Vector3d(-s.center.x(), -s.center.y(), -floor);
 
-  s.errors = o.errors;
-  s.errors.seed = mix(o.seed, 6);
-  if (!s.plan.mechanism && (o.carrier == Carrier::ideal || o.carrier == Carrier::automatic)) {
-    s.errors = RobotErrors::none();
-    s.errors.seed = mix(o.seed, 6);
-  }
+  s.errors = errors_of(o, s.plan);
   const RigRobot robot(s.plan, {s.errors, {}, false});
   std::vector<View> views;  // as commanded, and where the robot will be
   for (const capture::PlannedStop& stop : s.plan.stops)

@@ -28,29 +28,43 @@ struct Word {
   bool complete() const { return colon && !where.empty(); }
 };
 
-[[noreturn]] void unknown(const std::string& word, const char* expected) {
-  throw Error(ErrorCode::invalid_argument, std::string("expected ") + expected, word);
+constexpr const char* kRobotWords = "simulate, turntable, hand, serial:PORT";
+constexpr const char* kCameraWords = "simulate, hand, serial[:PORT], gphoto2[:PORT], folder:DIR";
+
+bool is_robot(const Word& w) {
+  const bool simple = w.what == "simulate" || w.what == "turntable" || w.what == "hand";
+  return (simple && w.alone()) || (w.what == "serial" && w.complete());
+}
+
+bool is_camera(const Word& w) {
+  const bool simple = w.what == "simulate" || w.what == "hand";
+  const bool with_port = w.what == "serial" || w.what == "gphoto2";
+  return (simple && w.alone()) || (with_port && (w.alone() || w.complete())) || (w.what == "folder" && w.complete());
+}
+
+[[noreturn]] void unknown(const std::string& word, const std::string& expected) {
+  throw Error(ErrorCode::invalid_argument, "expected one of " + expected, word);
 }
 
 }  // namespace
 
 void check_robot_word(const std::string& word) {
-  const Word w(word);
-  const bool simple = w.what == "simulate" || w.what == "turntable" || w.what == "hand";
-  if (!(simple && w.alone()) && !(w.what == "serial" && w.complete()))
-    unknown(word, "simulate, turntable, hand or serial:PORT");
+  if (!is_robot(Word(word))) unknown(word, kRobotWords);
 }
 
 void check_camera_word(const std::string& word) {
-  const Word w(word);
-  const bool simple = w.what == "simulate" || w.what == "hand";
-  const bool with_port = w.what == "serial" || w.what == "gphoto2";
-  if (!(simple && w.alone()) && !(with_port && (w.alone() || w.complete())) && !(w.what == "folder" && w.complete()))
-    unknown(word, "simulate, hand, serial[:PORT], gphoto2[:PORT] or folder:DIR");
+  if (!is_camera(Word(word))) unknown(word, kCameraWords);
 }
 
 Devices::Devices(std::filesystem::path folder, Operator& who) : folder_(std::move(folder)), who_(who) {}
 Devices::~Devices() = default;
+
+void Devices::bring(const std::string& word, BroughtDevices devices) { brought_[word] = std::move(devices); }
+
+std::string Devices::expected(std::string words, std::string BroughtDevices::*usage) const {
+  for (const auto& [word, devices] : brought_) words += ", " + devices.*usage;
+  return words;
+}
 
 std::filesystem::path Devices::memory() const {
   std::filesystem::path out = std::filesystem::absolute(folder_).lexically_normal();
@@ -67,8 +81,10 @@ std::shared_ptr<SerialLink> Devices::link(const std::string& port) {
 }
 
 std::unique_ptr<Robot> Devices::robot(const std::string& word, const Plan& plan) {
-  check_robot_word(word);
   const Word w(word);
+  if (const auto own = brought_.find(w.what); own != brought_.end() && (w.alone() || w.complete()))
+    return own->second.robot(w.where, plan);
+  if (!is_robot(w)) unknown(word, expected(kRobotWords, &BroughtDevices::robot_usage));
   using Moves = OperatorRobot::Moves;
   if (w.what == "turntable") return std::make_unique<OperatorRobot>(Moves::turntable, who_);
   if (w.what == "hand") return std::make_unique<OperatorRobot>(Moves::camera, who_);
@@ -88,8 +104,10 @@ std::unique_ptr<Robot> Devices::robot(const std::string& word, const Plan& plan)
 
 std::unique_ptr<CameraDevice> Devices::camera(const std::string& word, const std::string& name, const Robot& on,
                                               Job& job) {
-  check_camera_word(word);
   const Word w(word);
+  if (const auto own = brought_.find(w.what); own != brought_.end() && (w.alone() || w.complete()))
+    return own->second.camera(w.where, name, on);
+  if (!is_camera(w)) unknown(word, expected(kCameraWords, &BroughtDevices::camera_usage));
   if (w.what == "simulate")
     return std::make_unique<SimulatedCamera>(
         SimulatedCamera::Options{.name = name, .list = memory() / ("exposures-" + name), .card = {}},

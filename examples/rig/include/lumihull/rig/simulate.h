@@ -108,4 +108,10 @@ struct RigSession {
 /// plan: one that was stored, else options' or a new one.
 RigSession plan_session(const SimulateOptions& options, const std::optional<capture::Plan>& plan, Job& job);
 
+/// How far the session's robot is from its plan.
+RobotErrors errors_of(const SimulateOptions& options, const capture::Plan& plan);
+/// One of its cameras, whose truth goes into a folder.
+RigCamera::Options camera_of(const SimulateOptions& options, const RigSession& session, const std::string& name,
+                             const std::filesystem::path& truth);
+
 }  // namespace lumihull::rig
