@@ -31,7 +31,8 @@ constexpr double kBlocked_s = 1e6;  // so long that any other order is preferred
 
 /// Stops that share a bearing, and where the camera is turned to it: indices into Planner::stops_.
 struct Group {
-  int turn = -1;
+  std::vector<int> turns;  // places where it may be, the lowest one first; none: it need not be turned
+  int turn = -1;           // the one that is taken
   std::vector<int> stops;
 };
 
@@ -67,18 +68,13 @@ class Planner {
     keep_stops_that_can_be_taken();
     make_groups();
     keep_largest_part();
+    if (views_.bearing == Bearing::gravity) choose_turns();
     std::vector<int> order;
     job_.begin("ordering the stops", groups_.size());
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       const Group& group = groups_[g];
-      internal::PathProblem problem;
-      problem.places = group.stops;
-      problem.before = group.turn;
-      problem.after = g + 1 < groups_.size() ? groups_[g + 1].turn : -1;
-      problem.cost = [this](int a, int b) { return cost_s(a, b); };
-      problem.true_cost = [this](int a, int b) { return way_s(a, b); };
-      problem.distance = [this](int a, int b) { return motion_distance(mechanism_, pose(a), pose(b)); };
-      problem.starts = meanders(group.stops);
+      const internal::PathProblem problem =
+          path_through(group, group.turn, g + 1 < groups_.size() ? groups_[g + 1].turn : -1);
       if (group.turn >= 0) order.push_back(group.turn);
       const std::vector<int> path = internal::short_path(problem, options_.kicks, options_.seed + g, job_);
       order.insert(order.end(), path.begin(), path.end());
@@ -90,6 +86,50 @@ class Planner {
 
  private:
   const Pose& pose(int i) const { return stops_[std::size_t(i)].world_from_platform; }
+  Pose pose_at(double azimuth, double phi) const {
+    return platform_pose(views_.center, views_.radius_m, azimuth, phi, views_.tilt_factor, views_.tilt_offset_rad);
+  }
+
+  internal::PathProblem path_through(const Group& group, int before, int after) {
+    internal::PathProblem problem;
+    problem.places = group.stops;
+    problem.before = before;
+    problem.after = after;
+    problem.cost = [this](int a, int b) { return cost_s(a, b); };
+    problem.true_cost = [this](int a, int b) { return way_s(a, b); };
+    problem.distance = [this](int a, int b) { return motion_distance(mechanism_, pose(a), pose(b)); };
+    problem.starts = meanders(group.stops);
+    return problem;
+  }
+
+  /// Of each group's places the ones between which paths are shortest in sum: a path's length depends on where it
+  /// begins and where the next one does, so that the best sequence is found exactly (Viterbi 1967).
+  void choose_turns() {
+    constexpr int kKicks = 10;  // the paths need not be the best ones to be compared
+    std::vector<std::vector<std::size_t>> came(groups_.size());
+    std::vector<double> total(groups_.front().turns.size(), 0);
+    job_.begin("choosing where the camera is turned", groups_.size());
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      const std::vector<int> last{-1}, &next = g + 1 < groups_.size() ? groups_[g + 1].turns : last;
+      std::vector<double> with(next.size(), std::numeric_limits<double>::infinity());
+      came[g].resize(next.size());
+      for (std::size_t u = 0; u < next.size(); ++u)
+        for (std::size_t t = 0; t < total.size(); ++t) {
+          const internal::PathProblem problem = path_through(groups_[g], groups_[g].turns[t], next[u]);
+          const std::vector<int> path = internal::short_path(problem, kKicks, options_.seed + g, job_);
+          if (const double sum = total[t] + internal::path_cost(problem, path); sum < with[u])
+            with[u] = sum, came[g][u] = t;
+        }
+      total = std::move(with);
+      job_.advance();
+    }
+    job_.end();
+    std::size_t best = 0;
+    for (std::size_t g = groups_.size(); g-- > 0;) {
+      best = came[g][best];
+      groups_[g].turn = groups_[g].turns[best];
+    }
+  }
 
   void keep_stops_that_can_be_taken() {
     std::vector<PlannedStop> all = hemisphere_stops(mechanism_, views_);
@@ -154,9 +194,12 @@ class Planner {
     std::string why;
     for (Group& group : groups_) {
       const double azimuth = stops_[std::size_t(group.stops.front())].roll_rad;
-      if (auto place = turning_place(azimuth, int(usable.size()), &why)) {
-        group.turn = int(stops_.size());
-        stops_.push_back(std::move(*place));
+      for (PlannedStop& place : turning_places(azimuth, int(usable.size()), &why)) {
+        group.turns.push_back(int(stops_.size()));
+        stops_.push_back(std::move(place));
+      }
+      if (!group.turns.empty()) {
+        group.turn = group.turns.front();
         usable.push_back(std::move(group));
       } else {
         for (const int i : group.stops) tour_.left_out.push_back(stops_[std::size_t(i)].name);
@@ -167,35 +210,55 @@ class Planner {
     if (groups_.empty()) throw Error(ErrorCode::degenerate, why, mechanism_.name);
   }
 
-  /// The lowest place of an azimuth that can be taken and is tilted enough.
-  std::optional<PlannedStop> turning_place(double azimuth, int number, std::string* why_not) const {
-    constexpr double kStep = std::numbers::pi / 180;
+  /// Places of an azimuth that can be taken and are tilted enough: the lowest one, and some of the rows above it.
+  std::vector<PlannedStop> turning_places(double azimuth, int number, std::string* why_not) const {
+    constexpr double kDegree = std::numbers::pi / 180, kRounding_rad = 1e-9;
+    constexpr std::size_t kMostPlaces = 4;
     std::string why;
-    for (double phi = views_.phi_to_rad; phi >= 0; phi -= kStep) {
-      if (views_.tilt_rad(phi) < options_.release_tilt_rad) break;
-      const Pose pose =
-          platform_pose(views_.center, views_.radius_m, azimuth, phi, views_.tilt_factor, views_.tilt_offset_rad);
-      const PoseJudgement judged = judge_pose(mechanism_, pose, object_, options_.limits);
-      if (!judged.ok()) {
-        if (why.empty()) why = judged.obstacles.front().text;
-        continue;
+    const auto tilted = [&](double phi) {
+      return phi >= 0 && views_.tilt_rad(phi) >= options_.release_tilt_rad - kRounding_rad;
+    };
+    const auto can_be_taken = [&](double phi) {
+      const PoseJudgement judged = judge_pose(mechanism_, pose_at(azimuth, phi), object_, options_.limits);
+      if (!judged.ok() && why.empty()) why = judged.obstacles.front().text;
+      return judged.ok();
+    };
+    std::vector<double> usable;
+    for (double phi = views_.phi_to_rad; tilted(phi); phi -= kDegree)
+      if (can_be_taken(phi)) {
+        usable.push_back(phi);
+        break;
       }
-      PlannedStop stop = platform_stop(mechanism_, views_.center, pose, azimuth);
+    if (!usable.empty()) {
+      std::vector<double> rows;  // where the platform stops anyway
+      for (const PlannedStop& stop : stops_)
+        if (stop.photograph && stop.phi_rad < usable.front() - kDegree && tilted(stop.phi_rad))
+          rows.push_back(stop.phi_rad);
+      std::sort(rows.begin(), rows.end(), std::greater<>());
+      rows.erase(std::unique(rows.begin(), rows.end(), [](double a, double b) { return a - b < kDegree; }), rows.end());
+      std::erase_if(rows, [&](double phi) { return !can_be_taken(phi); });
+      const std::size_t more = std::min(rows.size(), kMostPlaces - 1);
+      for (std::size_t k = 1; k <= more; ++k) usable.push_back(rows[k * rows.size() / more - 1]);
+    }
+    std::vector<PlannedStop> places;
+    for (const double phi : usable) {
+      PlannedStop stop = platform_stop(mechanism_, views_.center, pose_at(azimuth, phi), azimuth);
       char name[32];
       std::snprintf(name, sizeof name, "turn-%03d", number);
       stop.name = name;
       stop.photograph = false;
       stop.settle_s = options_.turn_s, stop.exposure_s = 0;
-      return stop;
+      places.push_back(std::move(stop));
     }
+    if (!places.empty()) return places;
     char text[300];
     if (why.empty())
       std::snprintf(text, sizeof text,
                     "the camera can't be turned by gravity: at the largest polar angle the platform is tilted by %.1f "
                     "degrees, at least %.1f are needed",
-                    views_.tilt_rad(views_.phi_to_rad) / kStep, options_.release_tilt_rad / kStep);
+                    views_.tilt_rad(views_.phi_to_rad) / kDegree, options_.release_tilt_rad / kDegree);
     else
-      std::snprintf(text, sizeof text, "the camera can't be turned to azimuth %.1f degrees: %s", azimuth / kStep,
+      std::snprintf(text, sizeof text, "the camera can't be turned to azimuth %.1f degrees: %s", azimuth / kDegree,
                     why.c_str());
     *why_not = text;
     return {};
@@ -242,7 +305,9 @@ class Planner {
     // A stop counts where its camera can be turned, too.
     std::map<int, std::size_t> photographs;
     for (const Group& group : groups_)
-      for (const int i : group.stops) photographs[root(i)] += group.turn < 0 || root(group.turn) == root(i);
+      for (const int i : group.stops)
+        photographs[root(i)] += group.turns.empty() || std::any_of(group.turns.begin(), group.turns.end(),
+                                                                   [&](int turn) { return root(turn) == root(i); });
     int largest = std::max_element(photographs.begin(), photographs.end(), [](const auto& a, const auto& b) {
                     return a.second < b.second;
                   })->first;
@@ -254,7 +319,10 @@ class Planner {
     std::map<std::string, int> why;
     std::vector<Group> kept;
     for (Group& group : groups_) {
-      const bool turned = group.turn < 0 || root(group.turn) == largest;
+      const bool needs_turn = !group.turns.empty();
+      std::erase_if(group.turns, [&](int turn) { return root(turn) != largest; });
+      const bool turned = !needs_turn || !group.turns.empty();
+      if (turned && needs_turn) group.turn = group.turns.front();
       std::vector<int> reached;
       for (const int i : group.stops) {
         if (turned && root(i) == largest) {

@@ -81,7 +81,7 @@ struct PlannedTour {
 /// The platform moves from stop to stop along straight lines. A line is taken only if no cables cross on it and each
 /// pose of it can be taken (checked every 5 cm and 3 degrees); else it goes over or round the object, and stops on the
 /// way are added. With a bearing that gravity turns, stops of one bearing are taken together; before them the platform
-/// goes to the lowest place of their azimuth, where the camera is turned.
+/// goes to the lowest place of their azimuth, or to a row above it that is tilted enough, where the camera is turned.
 ///
 /// Method: a meander over the columns, over the rows, or the nearest neighbour, whichever is shortest; then 2-opt and
 /// Or-opt on neighbour lists until nothing improves; then double-bridge kicks, kept where they help. The answer depends
