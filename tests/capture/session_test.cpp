@@ -297,10 +297,11 @@ TEST(Session, TheContactSheetShowsEveryPhotographsState) {
     for (std::size_t at = page.find(text); at != std::string::npos; at = page.find(text, at + 1)) ++n;
     return n;
   };
-  EXPECT_EQ(count("<figure class=\"done\">"), 4u);
-  EXPECT_EQ(count("<figure class=\"wait\">"), 2u);
+  EXPECT_EQ(count(" class=\"done\">"), 4u);
+  EXPECT_EQ(count(" class=\"wait\">"), 2u);
   EXPECT_EQ(count("http-equiv=\"refresh\""), 0u);
   EXPECT_EQ(count("4 of 6 photographs"), 1u);
+  EXPECT_EQ(count("to look at"), 0u);
   for (std::size_t at = page.find("src=\""); at != std::string::npos; at = page.find("src=\"", at + 1)) {
     const std::string link = page.substr(at + 5, page.find('"', at + 5) - at - 5);
     EXPECT_GT(read_image(scene.folder / link).width(), 0) << link;
@@ -313,6 +314,8 @@ TEST(Session, TheContactSheetShowsEveryPhotographsState) {
   page = read_file(scene.folder / "contact.html");
   EXPECT_EQ(count("<em>dark</em>"), 1u);
   EXPECT_EQ(count("<em>unreadable</em>"), 1u);
+  EXPECT_EQ(count("to look at: <a href=\"#a000-e00-0\">a000-e00</a>, <a href=\"#a001-e00-0\">a001-e00</a></p>"), 1u);
+  EXPECT_EQ(count("<figure id=\"a000-e00-0\""), 1u);
   EXPECT_EQ(count("http-equiv=\"refresh\""), 1u);
 }
 

@@ -36,8 +36,7 @@ std::string note_of(const Plan& plan) {
           (plan.stops[i].world_from_platform.translation - plan.stops[i - 1].world_from_platform.translation).norm();
   }
   char text[200];
-  std::snprintf(text, sizeof text,
-                "%zu views, and %zu places that are passed or where the camera is turned; %.1f m; dark: first, light: last",
+  std::snprintf(text, sizeof text, "%zu views, %zu places to pass or to turn the camera, %.1f m; from dark to light",
                 photographs, plan.stops.size() - photographs, travel_m);
   return text;
 }
@@ -55,7 +54,7 @@ std::string drawn(const Plan& plan, const Side& side) {
   if (plan.mechanism) box.extend(flat(plan.mechanism->room.min())), box.extend(flat(plan.mechanism->room.max()));
   const Vector2d margin = Vector2d::Constant(0.04 * box.sizes().maxCoeff() + 1e-3);
   const Vector2d low = box.min() - margin, high = box.max() + margin, size = high - low;
-  const double scale = 620 / size.maxCoeff();  // the same along both axes
+  const double scale = 720 / size.maxCoeff();  // the same along both axes
   SvgFigure figure(side.title, kFrameWidth + scale * size.x(), kFrameHeight + scale * size.y());
   figure.axes(low.x(), high.x(), low.y(), high.y(), side.x_label, side.y_label);
   figure.note(note_of(plan));
@@ -100,7 +99,8 @@ std::string drawn(const Plan& plan, const Side& side) {
     for (std::size_t c = 0; c < plan.mechanism->cables.size(); ++c) {
       const Vector2d p = flat(plan.mechanism->cables[c].departure);
       figure.dot(p.x(), p.y(), 4, kCableColors[c]);
-      figure.text(p.x(), p.y() - 14 / scale, plan.mechanism->cables[c].name);
+      const Vector2d inwards = (flat(plan.mechanism->room.center()) - p).normalized() * 14 / scale;  // off the wall
+      figure.text(p.x() + inwards.x(), p.y() + inwards.y() - 4 / scale, plan.mechanism->cables[c].name);
     }
   return figure.standalone();
 }

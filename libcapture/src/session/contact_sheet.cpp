@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
@@ -33,14 +34,16 @@ constexpr double kClipped = 0.02;                  ///< more of a picture is not
 constexpr double kDark = 90;                       ///< 99 % of the pixels below
 constexpr double kBlurred = 1.7, kBlurred_px = 4;  ///< edges so much wider than usual, and at least so wide
 constexpr int kReload_s = 5;
+constexpr std::size_t kMostNamed = 40;  ///< photographs that are named above the others
 
 constexpr const char* kStyle = R"(
 :root{color-scheme:light dark;--line:#8884;--dim:#777}
 body{font:15px/1.4 system-ui,sans-serif;margin:0 auto;max-width:96rem;padding:1rem}
 h1{margin:.2rem 0;font-size:1.4rem}p{margin:.3rem 0}.dim{color:var(--dim)}
 progress{width:100%;height:.8rem}
-.grid{display:grid;gap:.5rem;grid-template-columns:repeat(auto-fill,minmax(9rem,1fr))}
-figure{margin:0;border:1px solid var(--line);border-top:4px solid var(--c);border-radius:.3rem;overflow:hidden}
+.grid{display:grid;gap:.5rem;margin-top:.6rem;grid-template-columns:repeat(auto-fill,minmax(9rem,1fr))}
+figure{scroll-margin:1rem;margin:0;border:1px solid var(--line);border-top:4px solid var(--c);border-radius:.3rem;overflow:hidden}
+:target{outline:3px solid var(--c)}
 figure a,figure i{display:flex;align-items:center;justify-content:center;aspect-ratio:3/2;background:#8882;color:var(--dim)}
 figure img{max-width:100%;max-height:100%}
 figcaption{padding:.15rem .4rem;font-size:.8rem;overflow-wrap:anywhere}
@@ -171,11 +174,14 @@ const ContactSheet::Thumbnail& ContactSheet::thumbnail(const Take& take) {
   return t;
 }
 
-std::string ContactSheet::figure(const Plan& plan, const JournalState& state, std::size_t i,
-                                 double usual_edge_width_px) {
+std::string ContactSheet::figure(const Plan& plan, const JournalState& state, std::size_t i, double usual_edge_width_px,
+                                 std::vector<std::string>& to_look_at) {
   const ShotProgress& shot = state.shots[i];
   const Word state_word = word(shot);
-  std::string out = std::string("<figure class=\"") + state_word.style + "\">";
+  std::string name = plan.stops[i / plan.cameras.size()].name;
+  const std::string id = name + "-" + std::to_string(i % plan.cameras.size());
+  if (plan.cameras.size() > 1) name += " · " + plan.cameras[i % plan.cameras.size()];
+  std::string out = "<figure id=\"" + html_escaped(id) + "\" class=\"" + state_word.style + "\">";
   std::string hints;
   if (shot.landed.empty()) {
     out += "<i>–</i>";
@@ -202,8 +208,8 @@ std::string ContactSheet::figure(const Plan& plan, const JournalState& state, st
     if (take.confirmed) hints += "<em>in doubt, confirmed</em>";
     if (shot.landed.size() > 1) hints += "<em>retaken</em>";
   }
-  std::string name = plan.stops[i / plan.cameras.size()].name;
-  if (plan.cameras.size() > 1) name += " · " + plan.cameras[i % plan.cameras.size()];
+  if (!hints.empty() || state_word.style == std::string_view("bad"))
+    to_look_at.push_back("<a href=\"#" + html_escaped(id) + "\">" + html_escaped(name) + "</a>");
   return out + "<figcaption>" + html_escaped(name) + " <b>" + state_word.text + "</b><br>" + hints +
          (shot.detail.empty() ? "" : "<span class=\"dim\">" + html_escaped(shot.detail) + "</span>") +
          "</figcaption></figure>\n";
@@ -241,10 +247,15 @@ void ContactSheet::write(const Plan& plan, const JournalState& state, const std:
                                                       {ShotStep::unknown, " unknown"}};
   for (const auto& [step, text] : counted)
     if (const std::size_t n = state.count(step)) page += "; " + std::to_string(n) + text;
-  page += "; last event " + html_escaped(state.last_time) + "</p>\n<div class=\"grid\">\n";
+  page += "; last event " + html_escaped(state.last_time) + "</p>\n";
+  std::string figures;
+  std::vector<std::string> to_look_at;
   for (std::size_t i = 0; i < state.shots.size(); ++i)
-    if (state.shots[i].step != ShotStep::none) page += figure(plan, state, i, usual);
-  page += "</div></body></html>\n";
+    if (state.shots[i].step != ShotStep::none) figures += figure(plan, state, i, usual, to_look_at);
+  for (std::size_t k = 0; k < std::min(kMostNamed, to_look_at.size()); ++k)
+    page += (k == 0 ? "<p>to look at: " : ", ") + to_look_at[k];
+  if (to_look_at.size() > kMostNamed) page += " and " + std::to_string(to_look_at.size() - kMostNamed) + " more";
+  page += (to_look_at.empty() ? "" : "</p>\n") + ("<div class=\"grid\">\n" + figures) + "</div></body></html>\n";
   if (changed_) write_cache();
   changed_ = false;
   write_file(folder_ / "contact.html", page);

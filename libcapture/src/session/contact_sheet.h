@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
 
 namespace lumihull::capture::internal {
 
@@ -26,7 +27,9 @@ class ContactSheet {
   void read_cache();
   void write_cache() const;
   const Thumbnail& thumbnail(const Take& take);
-  std::string figure(const Plan& plan, const JournalState& state, std::size_t shot, double usual_edge_width_px);
+  /// to_look_at: gets a link where something seems wrong.
+  std::string figure(const Plan& plan, const JournalState& state, std::size_t shot, double usual_edge_width_px,
+                     std::vector<std::string>& to_look_at);
 
   std::filesystem::path folder_;
   std::map<std::string, Thumbnail> thumbnails_;  ///< by the photograph's digest
