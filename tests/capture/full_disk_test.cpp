@@ -3,6 +3,7 @@
 
 #include <lumihull/base/capture.h>
 #include <lumihull/base/files.h>
+#include <lumihull/capture/land_card.h>
 #include <sys/mount.h>
 #include <sys/statvfs.h>
 
@@ -129,6 +130,51 @@ TEST(FullDisk, AtAnyMomentNothingIsLostOrHalfWritten) {
   }
   EXPECT_GT(stopped, 8u);
   for (const auto& [name, times] : named) RecordProperty(name, times);
+}
+
+TEST(FullDisk, ACardIsLandedInSeveralGoes) {
+  const SmallDisk disk(std::size_t(1) << 20);
+  if (!disk.mounted()) GTEST_SKIP() << "needs the right to mount a disk in memory";
+  const test::TemporaryFolder machines;
+  test::Scene scene(machines.path(), test::turntable_plan(6));
+  scene.folder = disk.path() / "object";
+  scene.options.least_free_bytes = 0;
+  scene.delivers = false;
+  EXPECT_EQ(scene.run().awaited, 6u);
+  const fs::path card = scene.memory / "card";
+  for (int i = 1; i <= 6; ++i)  // one file's RAW may not fit where its JPEG did
+    write_file(card / ("IMG_" + std::to_string(i) + ".NEF"), std::string(9000, char('a' + i)));
+  Job job;
+  std::size_t goes = 0;
+  for (std::size_t room = 0; room < 160 * 1024; room += 4096) {
+    SCOPED_TRACE(room);
+    disk.leave(room);
+    try {
+      land_card(scene.folder, card, {}, {}, job);
+    } catch (const Error& e) {
+      ++goes;
+      EXPECT_EQ(e.code(), ErrorCode::io) << e.what();
+      EXPECT_THAT(e.what(), HasSubstr("No space left on device"));
+      EXPECT_THAT(e.what(), HasSubstr(scene.folder.string()));
+    }
+  }
+  EXPECT_GT(goes, 4u);
+  disk.make_room();
+  const LandedCard last = land_card(scene.folder, card, {}, {}, job);
+  EXPECT_EQ(last.landed, 0u);
+  EXPECT_TRUE(last.troubles.empty());
+  std::size_t jpegs = 0;
+  for (const ShotProgress& shot : scene.state().shots) {
+    ASSERT_EQ(shot.step, ShotStep::landed);
+    const Take& take = shot.landed.back();
+    EXPECT_EQ(sha256_of_file(scene.folder / "photos" / take.file), take.sha256);
+    EXPECT_EQ(read_file((scene.folder / "photos" / take.file).replace_extension(".NEF")),
+              std::string(9000, char('a' + int(take.shot))));
+    ++jpegs;
+  }
+  EXPECT_EQ(std::size_t(std::distance(fs::directory_iterator(scene.folder / "photos"), {})), 2 * jpegs);
+  EXPECT_EQ(Capture::open(scene.folder).shots.size(), 6u);
+  EXPECT_TRUE(fs::is_empty(scene.folder / "incoming") || !fs::exists(scene.folder / "incoming"));
 }
 
 TEST(FullDisk, APlanIsWrittenWholeOrNotAtAll) {

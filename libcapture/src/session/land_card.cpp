@@ -73,7 +73,10 @@ class Landing {
     for (const std::string& note : out_.card.notes) say("note: " + note);
     say_clocks();
     for (const IngestedPhoto& p : photos_) {
-      if (asked_[p.shot].shot.landed) continue;
+      if (asked_[p.shot].shot.landed) {
+        if (!options_.dry_run) land_others(asked_[p.shot], p);
+        continue;
+      }
       ++out_.matched;
       if (options_.dry_run)
         say(p.from[0].string() + " -> " + title(asked_[p.shot].shot) + (p.by_order ? " (by order)" : ""));
@@ -87,10 +90,11 @@ class Landing {
       }
     for (const std::size_t s : out_.alignment.not_made) without(asked_[s], "it was not taken");
     for (const Ambiguity& g : out_.alignment.ambiguous) say_ambiguity(g);
-    if (out_.landed > 0) {
+    if (!options_.dry_run && journal_.state().views() > 0) {  // an earlier run may not have come so far
       const Plan plan = read_plan(plan_path(folder_));
       update_capture(folder_, plan, journal_.state());
-      write_contact_sheet(folder_, plan, journal_.state(), "pictures of a card were added", -1);
+      write_contact_sheet(folder_, plan, journal_.state(),
+                          out_.landed > 0 ? "pictures of a card were added" : "a card was read; nothing was new", -1);
     }
     return std::move(out_);
   }
@@ -138,20 +142,39 @@ class Landing {
       if (step == ShotStep::firing)
         journal_.append({.kind = EventKind::unknown, .shot = id, .text = "stopped while it was taken"});
       if (step != ShotStep::done) journal_.append({.kind = EventKind::decided, .shot = id, .answer = "taken"});
-      const std::string name = land_photograph(journal_, folder_, id, card_ / p.from[0]);
-      for (std::size_t i = 1; i < p.from.size(); ++i) {  // the RAW file of a JPEG
-        const fs::path to = folder_ / "photos" / (fs::path(name).stem().string() + p.from[i].extension().string());
-        AtomicFile out(to);
-        out.write(read_file(card_ / p.from[i]));
-        if (!out.commit_new() && sha256_of_file(to) != sha256_of_file(card_ / p.from[i]))
-          throw Error(ErrorCode::io, "another file of this name is there, and stays", to.string());
-      }
+      land_photograph(journal_, folder_, id, card_ / p.from[0]);
       ++out_.landed;
     } catch (const Error& e) {
-      if (e.code() == ErrorCode::cancelled) throw;
-      out_.troubles.push_back(title(asked.shot) + ": " + e.what());
-      say("problem: " + out_.troubles.back());
+      trouble(asked, e);
+      return;
     }
+    land_others(asked, p);
+  }
+
+  /// The RAW file of a JPEG that has landed, where it is not there yet.
+  void land_others(const Asked& asked, const IngestedPhoto& p) {
+    const Take& take = journal_.state().shots[asked.index].landed.back();
+    if (take.shot != asked.shot.id) return;  // retaken meanwhile
+    try {
+      for (std::size_t i = 1; i < p.from.size(); ++i) {
+        const fs::path to = folder_ / "photos" / (fs::path(take.file).stem().string() + p.from[i].extension().string());
+        if (fs::exists(to) && sha256_of_file(to) == sha256_of_file(card_ / p.from[i])) continue;
+        AtomicFile out(to);
+        out.write(read_file(card_ / p.from[i]));
+        if (!out.commit_new())
+          throw Error(ErrorCode::bad_input, "another file of this name is there, and stays", to.string());
+      }
+    } catch (const Error& e) {
+      trouble(asked, e);
+    }
+  }
+
+  /// One picture's trouble is not the next one's; but for a capture that can't be written to, as on a full disk.
+  void trouble(const Asked& asked, const Error& e) {
+    if (e.code() == ErrorCode::cancelled || (e.code() == ErrorCode::io && e.subject().starts_with(folder_.string())))
+      throw e;
+    out_.troubles.push_back(title(asked.shot) + ": " + e.what());
+    say("problem: " + out_.troubles.back());
   }
 
   void without(const Asked& asked, const std::string& why) {
