@@ -202,7 +202,8 @@ LearnedKey learn_key(const Capture& capture, std::span<const std::size_t> shots,
     std::vector<Image> pictures;
     for (std::size_t i = 0; i < used; ++i)
       if (positioned[i]) pictures.push_back(std::move(photos[i]));
-    learned.repair = MaskRepair::learn(list, pictures, std::vector<std::uint8_t>(list.size(), 0), job);
+    const std::vector<std::uint8_t> fixed(list.size(), 0);
+    learned.repair = MaskRepair::learn({list, pictures, fixed, {}, {}}, job);
   }
   return learned;
 }
