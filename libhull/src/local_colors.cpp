@@ -136,7 +136,7 @@ void agree(Image& mask, const Image& photo, std::span<const Open> open) {
 }  // namespace
 
 std::size_t decide_by_surroundings(Image& mask, const Image& photo, const CoarseView& view, const CoarseHull& hull,
-                                   const CoarseHull& wide, const PaperColors* paper) {
+                                   const CoarseHull& wide, const PaperColors* paper, int least) {
   const Image depth = hull.depth(view, 1), around = wide.depth(view, 1);
   const int width = depth.width(), height = depth.height(), pixels = mask.width() / width;
   const Samples samples = sample(mask, photo, view, depth, wide.silhouette(view, hull.margin_px(view)));
@@ -160,7 +160,7 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
             const std::uint8_t* p = photo.row<std::uint8_t>(v) + 3 * x * pixels;
             for (int u = x * pixels; u < (x + 1) * pixels; ++u, p += 3) {
               const bool is = row[u] >= 128;
-              if (is ? deep > 0 : !may_be) continue;
+              if (is ? deep > 0 || least > 0 : deep < least || !may_be) continue;
               if (!learned) {
                 learned = true;
                 object.clear(), background.clear();

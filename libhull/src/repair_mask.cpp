@@ -97,18 +97,20 @@ std::optional<MaskRepair> MaskRepair::learn(const Source& source, Job& job) {
     parallel_for(job, n, [&](std::size_t i) {
       if (!source.fixed[i])
         decide_by_surroundings(voting[i].mask, source.photos[i], voting[i], repair->hull_, repair->wide_,
-                               paper ? &*paper : nullptr);
+                               paper ? &*paper : nullptr, source.least_deep);
     });
     if (auto better = carve_voting()) repair = std::move(better);
   }
   repair->paper_ = std::move(paper);
   repair->background_ = source.background;
+  repair->least_deep_ = source.least_deep;
   return repair;
 }
 
 bool MaskRepair::mend(Image& mask, const Image& photo, const CoarseView& view) const {
   if (background_) take_shadows(mask, photo, *background_);
-  const std::size_t mended = decide_by_surroundings(mask, photo, view, hull_, wide_, paper_ ? &*paper_ : nullptr);
+  const std::size_t mended =
+      decide_by_surroundings(mask, photo, view, hull_, wide_, paper_ ? &*paper_ : nullptr, least_deep_);
   return double(mended) >= std::max(4.0, kLeastMended * mask.width() * mask.height());
 }
 
