@@ -21,7 +21,8 @@ constexpr float kUnknownAtRim = 0.3f * kUnknown;
 /// background; one, two, and more voxels deep.
 constexpr float kBeside = 0.5f, kAround = 1;
 constexpr std::array<float, 3> kDeep{2, 8, 32};
-constexpr float kPaperOdds = 4;  // and by a colour that only sheets have
+constexpr float kPaperOdds = 4;      // and by a colour that only sheets have
+constexpr double kLeastSure = 5e-5;  // of the picture: so many pixels so deep make a mask doubtful
 constexpr int kRounds = 6;
 constexpr float kAgree = 3;      // log odds that a neighbour of the same colour is worth
 constexpr float kSigma = 12;     // levels by which neighbours' colours may differ
@@ -139,6 +140,14 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
                                    const CoarseHull& wide, const PaperColors* paper, int least) {
   const Image depth = hull.depth(view, 1), around = wide.depth(view, 1);
   const int width = depth.width(), height = depth.height(), pixels = mask.width() / width;
+  if (least > 0) {
+    std::size_t sure = 0;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        sure += depth.row<std::uint8_t>(y)[x] >= least &&
+                mask.row<std::uint8_t>(y * pixels + pixels / 2)[x * pixels + pixels / 2] < 128;
+    if (double(sure) < std::max(4.0, kLeastSure * width * height)) return 0;
+  }
   const Samples samples = sample(mask, photo, view, depth, wide.silhouette(view, hull.margin_px(view)));
   ColorCounts all_object, all_background, object, background;
   for (std::size_t i = 0; i < samples.kinds.size(); ++i) {
@@ -160,7 +169,7 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
             const std::uint8_t* p = photo.row<std::uint8_t>(v) + 3 * x * pixels;
             for (int u = x * pixels; u < (x + 1) * pixels; ++u, p += 3) {
               const bool is = row[u] >= 128;
-              if (is ? deep > 0 || least > 0 : deep < least || !may_be) continue;
+              if (is ? deep > 0 || least > 0 : !may_be || (least > 0 && deep == 0)) continue;
               if (!learned) {
                 learned = true;
                 object.clear(), background.clear();

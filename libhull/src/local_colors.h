@@ -16,8 +16,9 @@ namespace lumihull::hull {
 /// only with the eight around).
 ///
 /// mask, photo: 8 bits, whole or as coarse as the view, whose mask counts for its size only. paper: colours that are
-/// background on sheets alone; nullptr: unknown. least: 0, or how
-/// many voxels deep background must lie to be looked at; then object is not. Returns how many pixels became object.
+/// background on sheets alone; nullptr: unknown. least: 0, or so deep must the
+/// mask show background for more than specks to be doubted at all; then object and what lies beside the hull are not.
+/// Returns how many pixels became object.
 std::size_t decide_by_surroundings(Image& mask, const Image& photo, const CoarseView& view, const CoarseHull& hull,
                                    const CoarseHull& wide, const PaperColors* paper, int least);
 

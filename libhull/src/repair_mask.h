@@ -36,8 +36,8 @@ class MaskRepair {
     std::span<const std::uint8_t> fixed;            ///< 1: a mask that votes and is not changed
     std::span<const calib::CalibratedBody> sheets;  ///< targets as solved, if known
     std::optional<calib::Rgb> background;           ///< whose shadows are taken off; none: the masks are without them
-    /// 0; or so many voxels deep must background lie to be doubted, where the key was learned from the photographs: it
-    /// knows the colours at the hull's rim.
+    /// 0; or so many voxels deep must a mask show background to be doubted, where the key was learned from the
+    /// photographs: it knows the colours at the hull's rim.
     int least_deep = 0;
   };
   /// nullopt where nothing can be said: less than five views, or no hull.
