@@ -1,6 +1,7 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/parallel.h>
 #include <lumihull/calib/background.h>
+#include <lumihull/calib/target_model.h>
 #include <lumihull/hull/auto_key.h>
 
 #include <algorithm>
@@ -73,12 +74,6 @@ CoarseView coarse_view(const Capture& capture, std::size_t shot, const Image& ph
   return view;
 }
 
-Image cleaned(Image mask) {
-  const double pixels = double(mask.width()) * mask.height();
-  calib::clean_mask(mask, int(kSpeck * pixels), int(kHole * pixels));
-  return mask;
-}
-
 bool is_given(const Capture& capture, std::size_t shot) {
   const MaskSource source = capture.mask_state(capture.shots[shot]);
   return source == MaskSource::imported || source == MaskSource::edited;
@@ -106,10 +101,14 @@ std::optional<MaskRepair> look_around(const Capture& capture, std::span<const st
         photos[i] = thinned(photo, views[i].step);
         given[i] = is_given(capture, shot);
         views[i].mask = given[i] ? thinned(capture.read_mask(shot), views[i].step)
-                                 : cleaned(calib::key_image(key, photos[i], {calib::EdgeMode::hard, 0, 0}));
+                                 : calib::key_image(key, photos[i], {calib::EdgeMode::hard, 0, 0});
       },
       true);
-  auto repair = MaskRepair::learn(views, photos, given, job);
+  std::optional<calib::TargetModel> model;
+  if (std::filesystem::exists(calib::target_model_path(capture))) model = calib::TargetModel::of(capture);
+  std::span<const calib::CalibratedBody> sheets;
+  if (model) sheets = model->calibration.bodies;
+  auto repair = MaskRepair::learn({views, photos, given, sheets, key.background_median(), 0}, job);
   job.end();
   return repair;
 }
@@ -219,28 +218,22 @@ KeyReport key_capture(Capture& capture, const KeyOptions& options, Job& job) {
         if (photo.type() != PixelType::u8) photo = calib::keyable(photo);
         const double pixels = double(photo.width()) * photo.height();
         const int speck = options.clean ? int(kSpeck * pixels) : 0, hole = options.clean ? int(kHole * pixels) : 0;
+        const bool judged = repair && capture.positioned(shot);
         Image mask;
-        if (learned) {
-          mask = calib::key_image(*key, photo, {calib::EdgeMode::hard, 0, 0});
-          confine(mask, photo, capture, shot, *learned);
-        } else {
+        if (!learned && !judged) {
           mask = calib::key_image(*key, photo, {options.edges, speck, hole});
-        }
-        std::optional<MaskRepair::Patch> patch;
-        int step = 1;
-        if (repair && capture.positioned(shot)) {
-          CoarseView view = coarse_view(capture, shot, photo);
-          step = view.step;
-          view.mask = cleaned(thinned(mask, step));
-          if (repair->contradict(view)) patch = repair->find(view, thinned(photo, step));
-        }
-        if (learned || patch) {
-          if (!learned) mask = calib::key_image(*key, photo, {calib::EdgeMode::hard, 0, 0});
-          if (patch) mend(mask, photo, *patch, step);
-          mended[i] = patch.has_value();
+        } else {
+          mask = calib::key_image(*key, photo, {calib::EdgeMode::hard, 0, 0});
+          if (learned) confine(mask, photo, capture, shot, *learned);
+          if (judged) {
+            CoarseView view = coarse_view(capture, shot, photo);
+            view.mask = thinned(mask, view.step);
+            mended[i] = repair->mend(mask, photo, view);
+          }
           if (learned && options.clean) fill_shadows(mask, capture, shot, *learned);
           calib::clean_mask(mask, speck, hole);
           calib::soften_edges(mask, photo, options.edges);
+          calib::clean_mask(mask, 0, hole);  // coverage opens mixed pixels anew
         }
         std::size_t object = 0;
         for (int y = 0; y < mask.height(); ++y) {

@@ -19,6 +19,7 @@ constexpr int kDark = 40;                // brightest channel of a background th
 constexpr double kDarkTolerance = 0.25;  // as kTolerance, before such a background
 constexpr double kShadowShare = 0.2;     // shadows among the background samples
 constexpr double kObjectShare = 0.5;     // samples of the object's own colours, as a share of the background's
+constexpr int kSure = 3;  // voxels below the hull's surface: no shaving of a rightful outline is so thick
 constexpr int kMostRounds = 5;
 constexpr double kSettled = 0.002;  // changed pixels, as a share of the object's
 
@@ -202,7 +203,8 @@ LearnedKey learn_key(const Capture& capture, std::span<const std::size_t> shots,
     std::vector<Image> pictures;
     for (std::size_t i = 0; i < used; ++i)
       if (positioned[i]) pictures.push_back(std::move(photos[i]));
-    learned.repair = MaskRepair::learn(list, pictures, std::vector<std::uint8_t>(list.size(), 0), job);
+    const std::vector<std::uint8_t> fixed(list.size(), 0);
+    learned.repair = MaskRepair::learn({list, pictures, fixed, {}, {}, kSure}, job);
   }
   return learned;
 }

@@ -2,7 +2,9 @@
 
 #include <lumihull/base/image.h>
 #include <lumihull/base/job.h>
+#include <lumihull/calib/calibrate.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -10,59 +12,49 @@
 #include <vector>
 
 #include "coarse_hull.h"
+#include "paper_colors.h"
 
 namespace lumihull::hull {
 
-/// Which colours are rare in the background that one photograph shows.
-class RareColors {
- public:
-  /// photo: 8 bits, 3 channels; outside: 255 where it shows background, the same size.
-  RareColors(const Image& photo, const Image& outside);
-  /// rgb: 3 bytes. True where 97 % of the background have a colour that occurs more often (among its like).
-  bool rare(const std::uint8_t* rgb) const { return density_[bin(rgb)] <= rarest_; }
+/// What lies in the enclosure's shadow: darker than the enclosure and more saturated, for what light reaches a shadow
+/// has met a wall before. Sets such object pixels to 0. background: the enclosure's usual colour; a grey one has no
+/// such shadows. mask, photo: 8 bits, of one size.
+void take_shadows(Image& mask, const Image& photo, const calib::Rgb& background);
 
- private:
-  static std::size_t bin(const std::uint8_t* rgb) {
-    return (std::size_t(rgb[0] >> 2) << 12) | (std::size_t(rgb[1] >> 2) << 6) | std::size_t(rgb[2] >> 2);
-  }
-  std::vector<float> density_;  ///< 64³ bins, each a mean of itself and its neighbours
-  float rarest_ = 0;
-};
-
-/// Mends masks where the object took on the enclosure's colour (light that the enclosure throws on a pale or shiny
-/// surface), by what the other views say.
+/// Mends masks by what the other views say: where the object took on the enclosure's colour or that of the sheets in
+/// it, and where a mask holds what none of the others does.
 ///
-/// A hull is carved that one view alone can't carve (with many views: a few). Where a mask shows background before the
-/// depth of that hull, nearly all others contradict it: an outline of its own right cuts off only the thin shavings
-/// that no other view saw. A hole that is there, but that hardly any other view looks through, is told by its colours:
-/// they are those that this photograph shows beside the object. Bleeding brings colours near the enclosure's, but
-/// hardly ever these.
+/// Two hulls are carved: one that a single view can't carve (with many views: a few), and one that hardly a third of
+/// them can, which holds all that may be object. What a mask contradicts is decided by the colours around
+/// (decide_by_surroundings); better masks carve a better hull.
 class MaskRepair {
  public:
-  /// views: their masks as keyed, and mended in place (but where `fixed`); photos: the same pictures, 8 bits, 3
-  /// channels. Hull and masks improve each other in a few rounds. nullopt where nothing can be said: less than five
-  /// views, or no hull.
-  static std::optional<MaskRepair> learn(std::span<CoarseView> views, std::span<const Image> photos,
-                                         std::span<const std::uint8_t> fixed, Job& job);
-
-  /// Whether a coarse mask shows background where the hull's core is: hardly any does, and the rest need no `find`.
-  bool contradict(const CoarseView& view) const;
-
-  /// What of a coarse mask is object although keyed as background.
-  struct Patch {
-    Image pixels;  ///< 8 bits, 1 channel, coarse: 255 where it is
-    Image reach;   ///< 255 where, beside `pixels`, rare colours are object as well
-    RareColors colors;
+  /// What there is to learn from.
+  struct Source {
+    std::span<const CoarseView> views;              ///< their masks as keyed
+    std::span<const Image> photos;                  ///< the same pictures, thinned, 8 bits, 3 channels
+    std::span<const std::uint8_t> fixed;            ///< 1: a mask that votes and is not changed
+    std::span<const calib::CalibratedBody> sheets;  ///< targets as solved, if known
+    std::optional<calib::Rgb> background;           ///< whose shadows are taken off; none: the masks are without them
+    /// 0; or so many voxels deep must a mask show background to be doubted, where the key was learned from the
+    /// photographs: it knows the colours at the hull's rim.
+    int least_deep = 0;
   };
-  /// nullopt: nothing. photo: thinned like the view's mask.
-  std::optional<Patch> find(const CoarseView& view, const Image& photo) const;
+  /// nullopt where nothing can be said: less than five views, or no hull.
+  static std::optional<MaskRepair> learn(const Source& source, Job& job);
+
+  /// Mends a mask. mask, photo: whole, 8 bits, undecided edges; view: of it, coarse, its mask of the right size.
+  /// True where more than specks became object.
+  bool mend(Image& mask, const Image& photo, const CoarseView& view) const;
 
  private:
-  explicit MaskRepair(CoarseHull hull) : hull_(std::move(hull)) {}
-  CoarseHull hull_;
-};
+  MaskRepair(CoarseHull hull, CoarseHull wide) : hull_(std::move(hull)), wide_(std::move(wide)) {}
+  static std::optional<MaskRepair> carve(std::span<const CoarseView> views, Job& job);
 
-/// Sets to 255 what a patch calls object. mask and photo: whole, 8 bits.
-void mend(Image& mask, const Image& photo, const MaskRepair::Patch& patch, int step);
+  CoarseHull hull_, wide_;
+  std::optional<PaperColors> paper_;
+  std::optional<calib::Rgb> background_;
+  int least_deep_ = 0;
+};
 
 }  // namespace lumihull::hull

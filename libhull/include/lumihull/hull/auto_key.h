@@ -32,9 +32,9 @@ struct LUMIHULL_API KeyOptions {
   calib::EdgeMode edges = calib::EdgeMode::matte;
   /// Takes away specks of less than 0.02 % of the picture and fills holes of up to 0.01 % (learned
   /// from photographs before a dark enclosure: 0.3 %, where the hull agrees). Where cameras are known, it also
-  /// mends masks that nearly all the others contradict and whose colours are not those beside the object: there the
-  /// object took on the enclosure's colour. With clean = false, edges hard or soft, and background =
-  /// "enclosure" the masks are the paper's, pixel by pixel.
+  /// decides by the colours around what of a mask the others contradict: where the object took on the enclosure's
+  /// colour or, where targets were calibrated, that of their paper, and where shadows were taken for object. With clean
+  /// = false, edges hard or soft, and background = "enclosure" the masks are the paper's, pixel by pixel.
   bool clean = true;
 
   /// Throws Error{invalid_argument} naming the option.
