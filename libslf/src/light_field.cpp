@@ -9,11 +9,13 @@
 #include <utility>
 
 #include "atlas.h"
+#include "byte_scale.h"
 #include "color.h"
 #include "exposure.h"
 #include "joint_fit.h"
 #include "light_field_terms.h"
 #include "photo_options.h"
+#include "reflection_fit.h"
 #include "ring_fit.h"
 #include "rings.h"
 #include "surface_fill.h"
@@ -23,6 +25,8 @@
 
 namespace lumihull::slf {
 namespace {
+
+constexpr double kLeastReflection = 0.1;  // of the variance that it must explain to be kept
 
 void check(const LightFieldOptions& o) {
   constexpr const char* kWhose = "light field options";
@@ -46,6 +50,19 @@ std::vector<BlendColor> mean_colors(const hull::Mesh& mesh, const Atlas& atlas, 
   }
   filled = fill_surface(mesh, atlas, colors);
   return colors;
+}
+
+LightFieldReflection reflection_of(const ReflectionFit& fit) {
+  LightFieldReflection out;
+  out.normals = fit.normals;
+  float low = 0, high = 0;
+  for (const auto& light : fit.light) low = std::min(low, light.minCoeff()), high = std::max(high, light.maxCoeff());
+  out.scale = {std::max(high - low, 1e-6f), low};
+  out.light = Image(kReflectionSide, kReflectionSide, 3);
+  for (std::size_t i = 0; i < fit.light.size(); ++i)
+    for (int c = 0; c < 3; ++c)
+      out.light.row<std::uint8_t>(0)[3 * i + std::size_t(c)] = to_byte(fit.light[i][c], out.scale);
+  return out;
 }
 
 std::vector<Eigen::Vector3f> nodes_of(const hull::Mesh& mesh, std::span<const PhotoSamples> samples, std::size_t most) {
@@ -78,6 +95,17 @@ void validate(const LightField& field, const std::string& name) {
         if (t[j] != t[(j + 1) % 3] && field.slot[t[j]] == field.slot[t[(j + 1) % 3]])
           fail("triangle " + std::to_string(i) + " has two corners of one slot");
     }
+  }
+  if (field.reflection) {
+    const LightFieldReflection& r = *field.reflection;
+    if (r.normals.size() != vertices) fail("reflection: expected a normal for each vertex");
+    for (const auto& n : r.normals)
+      if (!n.allFinite() || std::abs(n.norm() - 1) > 0.02f) fail("reflection: expected normals of unit length");
+    if (r.light.width() != r.light.height() || r.light.width() < 3 || r.light.width() > 1024 ||
+        r.light.channels() != 3 || r.light.type() != PixelType::u8)
+      fail("reflection: expected a square map of 8-bit RGB, 3 to 1024 pixels a side");
+    if (!std::isfinite(r.scale.scale) || !std::isfinite(r.scale.offset))
+      fail("reflection: scale and offset are not finite");
   }
   if (field.terms.size() > std::size_t(kMaxTerms)) fail("expected at most 12 terms");
   for (std::size_t k = 0; k < field.terms.size(); ++k) {
@@ -128,6 +156,15 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
   }
 
   LightField field;
+  double reflection_share = 0;
+  if (joint && options.reflections) {
+    const ReflectionFit reflection = fit_reflection(mesh, atlas, samples, job);
+    reflection_share = 1 - reflection.left;
+    if (reflection_share > kLeastReflection) {
+      take_off(reflection, mesh, atlas, samples, job);
+      field.reflection = reflection_of(reflection);
+    }
+  }
   field.base.mesh = mesh;
   field.up = up_axis(photos.views).cast<float>();
   field.nodes = nodes_of(mesh, samples, std::size_t(options.max_nodes));
@@ -163,6 +200,7 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
     report->samples = 0;
     for (const PhotoSamples& p : samples) report->samples += p.samples.size();
     report->gains = std::move(gains);
+    report->reflection_share = reflection_share;
     report->rms = rms;
     report->rms_of_mean = fit.rms_of_mean;
   }
