@@ -55,13 +55,19 @@ std::vector<BlendColor> mean_colors(const hull::Mesh& mesh, const Atlas& atlas, 
 LightFieldReflection reflection_of(const ReflectionFit& fit) {
   LightFieldReflection out;
   out.normals = fit.normals;
-  float low = 0, high = 0;
-  for (const auto& light : fit.light) low = std::min(low, light.minCoeff()), high = std::max(high, light.maxCoeff());
-  out.scale = {std::max(high - low, 1e-6f), low};
-  out.light = Image(kReflectionSide, kReflectionSide, 3);
-  for (std::size_t i = 0; i < fit.light.size(); ++i)
-    for (int c = 0; c < 3; ++c)
-      out.light.row<std::uint8_t>(0)[3 * i + std::size_t(c)] = to_byte(fit.light[i][c], out.scale);
+  const auto picture = [&](std::size_t first, ByteScale& scale) {
+    const std::span<const Eigen::Vector3f> light(&fit.light[first], std::size_t(kReflectionSide * kReflectionSide));
+    float low = 0, high = 0;
+    for (const auto& l : light) low = std::min(low, l.minCoeff()), high = std::max(high, l.maxCoeff());
+    scale = {std::max(high - low, 1e-6f), low};
+    Image map(kReflectionSide, kReflectionSide, 3);
+    for (std::size_t i = 0; i < light.size(); ++i)
+      for (std::size_t c = 0; c < 3; ++c)
+        map.row<std::uint8_t>(0)[3 * i + c] = to_byte(light[i][std::ptrdiff_t(c)], scale);
+    return map;
+  };
+  out.light = picture(0, out.light_scale);
+  out.grazing = picture(fit.light.size() / 2, out.grazing_scale);
   return out;
 }
 
@@ -101,11 +107,12 @@ void validate(const LightField& field, const std::string& name) {
     if (r.normals.size() != vertices) fail("reflection: expected a normal for each vertex");
     for (const auto& n : r.normals)
       if (!n.allFinite() || std::abs(n.norm() - 1) > 0.02f) fail("reflection: expected normals of unit length");
-    if (r.light.width() != r.light.height() || r.light.width() < 3 || r.light.width() > 1024 ||
-        r.light.channels() != 3 || r.light.type() != PixelType::u8)
-      fail("reflection: expected a square map of 8-bit RGB, 3 to 1024 pixels a side");
-    if (!std::isfinite(r.scale.scale) || !std::isfinite(r.scale.offset))
-      fail("reflection: scale and offset are not finite");
+    for (const Image* map : {&r.light, &r.grazing})
+      if (map->width() != map->height() || map->width() < 3 || map->width() > 1024 || map->width() != r.light.width() ||
+          map->channels() != 3 || map->type() != PixelType::u8)
+        fail("reflection: expected two square maps of 8-bit RGB, 3 to 1024 pixels a side");
+    for (const ByteScale& s : {r.light_scale, r.grazing_scale})
+      if (!std::isfinite(s.scale) || !std::isfinite(s.offset)) fail("reflection: scale and offset are not finite");
   }
   if (field.terms.size() > std::size_t(kMaxTerms)) fail("expected at most 12 terms");
   for (std::size_t k = 0; k < field.terms.size(); ++k) {

@@ -136,7 +136,9 @@ LightField light_field_of(const GlbFile& file) {
       r.normals.push_back(n.normalized());
     }
     r.light = file.texture(glb_index(json.at("light")));
-    r.scale = scale_of(json.at("scale"));
+    r.grazing = file.texture_like(r.light, glb_index(json.at("grazing")));
+    r.light_scale = scale_of(json.at("lightScale"));
+    r.grazing_scale = scale_of(json.at("grazingScale"));
   }
   const JsonReader terms = extension.at("terms");
   const std::size_t count = terms.array_size(std::size_t(kMaxTerms));
@@ -212,7 +214,9 @@ std::string encode_light_field(const LightField& field, const LightFieldFileOpti
       for (int c = 0; c < 3; ++c) normals.push_back(std::int8_t(std::lround(127 * field.reflection->normals[v][c])));
     extension["reflection"] = {{"normals", buffer.add_view(normals.data(), normals.size())},
                                {"light", add_picture(encode_png(field.reflection->light), false)},
-                               {"scale", scale_json(field.reflection->scale)}};
+                               {"lightScale", scale_json(field.reflection->light_scale)},
+                               {"grazing", add_picture(encode_png(field.reflection->grazing), false)},
+                               {"grazingScale", scale_json(field.reflection->grazing_scale)}};
   }
   extension["terms"] = Json::array();
   for (const LightFieldTerm& term : field.terms) {

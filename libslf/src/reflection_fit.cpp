@@ -19,9 +19,15 @@ constexpr float kSmoothness = 0.02f, kTowardsZero = 0.002f;  // in shares of a n
 constexpr std::uint8_t kWhite = 253;
 constexpr float kVisible = 0.02f;
 
+/// Where a look is reflected to, and how flat it is.
+struct MirrorPlace {
+  SphereGrid::Place at;
+  float grazing = 0;
+};
+
 /// A texel as one photograph shows it.
 struct Look {
-  SphereGrid::Place place;
+  MirrorPlace place;
   float weight = 0;
   Vector3f color;  // linear
   std::array<bool, 3> white{};
@@ -38,22 +44,31 @@ class Fit {
 
   const SphereGrid& grid() const { return grid_; }
 
-  Vector3f at(const Light& light, const SphereGrid::Place& p) const {
+  Vector3f at(const Light& light, const MirrorPlace& p) const {
     Vector3f sum = Vector3f::Zero();
-    for (std::size_t k = 0; k < 4; ++k) sum += p.weight[k] * light[alias_[p.node[k]]];
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::uint32_t node = alias_[p.at.node[k]];
+      sum += p.at.weight[k] * (light[node] + p.grazing * light[grid_.size() + node]);
+    }
     return sum;
   }
-  void spread(Light& light, const SphereGrid::Place& p, const Vector3f& value) const {
-    for (std::size_t k = 0; k < 4; ++k) light[alias_[p.node[k]]] += p.weight[k] * value;
+  void spread(Light& light, const MirrorPlace& p, const Vector3f& value) const {
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::uint32_t node = alias_[p.at.node[k]];
+      light[node] += p.at.weight[k] * value;
+      light[grid_.size() + node] += p.at.weight[k] * p.grazing * value;
+    }
   }
 
-  SphereGrid::Place place(const Texel& texel, const Vector3f& eye) const {
+  MirrorPlace place(const Texel& texel, const Vector3f& eye) const {
     const auto& t = mesh_.triangles[texel.triangle];
     const float b0 = 1 - texel.b1 - texel.b2;
     const auto between = [&](const Light& of) -> Vector3f {
       return b0 * of[t[0]] + texel.b1 * of[t[1]] + texel.b2 * of[t[2]];
     };
-    return grid_.at(mirrored((eye - between(mesh_.vertices)).stableNormalized(), between(normals_).stableNormalized()));
+    const Vector3f to_eye = (eye - between(mesh_.vertices)).stableNormalized(),
+                   normal = between(normals_).stableNormalized();
+    return {grid_.at(mirrored(to_eye, normal)), grazing(to_eye.dot(normal))};
   }
 
   /// Calls visit(chunk, looks) for every texel; chunks are parts of the work whose number is fixed.
@@ -124,16 +139,19 @@ Light sum_of(const std::vector<Light>& chunks, std::size_t size) {
 /// The regularisation's part of the normal equations: differences of neighbouring nodes, and the values themselves.
 void add_smoothness(const SphereGrid& grid, const Light& x, float weight, Light& out) {
   const auto side = std::uint32_t(grid.side());
-  const auto couple = [&](std::uint32_t a, std::uint32_t b) {
-    a = grid.alias(a), b = grid.alias(b);
+  const auto nodes = std::uint32_t(grid.size());
+  const auto couple = [&](std::uint32_t first, std::uint32_t a, std::uint32_t b) {
+    a = first + grid.alias(a), b = first + grid.alias(b);
     const Vector3f d = kSmoothness * weight * (x[a] - x[b]);
     out[a] += d, out[b] -= d;
   };
-  for (std::uint32_t i = 0; i < grid.size(); ++i) {
-    if (i % side + 1 < side) couple(i, i + 1);
-    if (i / side + 1 < side) couple(i, i + side);
-    if (grid.alias(i) == i) out[i] += kTowardsZero * weight * x[i];
-  }
+  for (std::uint32_t part = 0; part < 2; ++part)
+    for (std::uint32_t i = 0; i < nodes; ++i) {
+      const std::uint32_t first = part * nodes;
+      if (i % side + 1 < side) couple(first, i, i + 1);
+      if (i / side + 1 < side) couple(first, i, i + side);
+      if (grid.alias(i) == i) out[first + i] += kTowardsZero * weight * x[first + i];
+    }
 }
 
 Eigen::Array3d dot(const Light& a, const Light& b) {
@@ -149,7 +167,7 @@ ReflectionFit fit_reflection(const hull::Mesh& mesh, const Atlas& atlas, std::sp
   ReflectionFit out;
   out.normals = hull::vertex_normals(mesh);
   const Fit fit(mesh, atlas, photos, out.normals);
-  const std::size_t size = fit.grid().size();
+  const std::size_t nodes = fit.grid().size(), size = 2 * nodes;
   Light x(size, Vector3f::Zero());
   float node_weight = 0;
   const auto multiplied = [&](const Light& v) {
@@ -178,7 +196,7 @@ ReflectionFit fit_reflection(const hull::Mesh& mesh, const Atlas& atlas, std::sp
     Light residual = sum_of(parts, size);
     double weight = 0;
     for (const double w : weights) weight += w;
-    node_weight = float(weight / double(size));
+    node_weight = float(weight / double(nodes));
     {
       Light pull(size, Vector3f::Zero());
       add_smoothness(fit.grid(), x, node_weight, pull);
@@ -214,7 +232,10 @@ ReflectionFit fit_reflection(const hull::Mesh& mesh, const Atlas& atlas, std::sp
   for (const auto& s : sums) before += s[0], after += s[1];
   out.left = before > 0 ? after / before : 1;
   out.light.resize(size);
-  for (std::uint32_t i = 0; i < size; ++i) out.light[i] = x[fit.grid().alias(i)];
+  for (std::uint32_t i = 0; i < nodes; ++i) {
+    out.light[i] = x[fit.grid().alias(i)];
+    out.light[nodes + i] = x[nodes + fit.grid().alias(i)];
+  }
   return out;
 }
 

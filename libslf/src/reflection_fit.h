@@ -16,7 +16,8 @@ namespace lumihull::slf {
 /// What all places mirror alike: linear light by the mirrored direction, on top of each place's own colour.
 struct ReflectionFit {
   std::vector<Eigen::Vector3f> normals;  ///< of the vertices, unit length: those that it is mirrored by
-  std::vector<Eigen::Vector3f> light;    ///< of a SphereGrid's nodes
+  /// Of a SphereGrid's nodes; then, as many, what comes on top where it is seen flatly, times grazing().
+  std::vector<Eigen::Vector3f> light;
   double left = 1;  ///< of the samples' variance about each texel's mean colour, the share that is left
 };
 

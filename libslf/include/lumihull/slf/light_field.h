@@ -40,8 +40,9 @@ struct LightFieldTerm {
 /// place's normal mirrors the eye's to.
 struct LightFieldReflection {
   std::vector<Eigen::Vector3f> normals;  ///< of the vertices, unit length
-  Image light;  ///< square, 8-bit, 3 channels, 3 … 1024 px a side; directions as in SphereGrid
-  ByteScale scale;
+  Image light;    ///< square, 8-bit, 3 channels, 3 … 1024 px a side; directions as in SphereGrid
+  Image grazing;  ///< as large: what comes on top where a place is seen flatly, times (1 - n·d)³
+  ByteScale light_scale, grazing_scale;
 };
 
 /// A surface light field on a mesh, factored (Chen, Bouguet, Chu & Grzeszczuk 2002). A surface point p on a triangle
@@ -53,7 +54,7 @@ struct LightFieldReflection {
 /// T the base's texture (left out where `adds_base` is false), Λ_j the barycentric coordinates. View maps are values at
 /// nodes, places that an eye may be at: h_k[v](e) = Σ_i w_i(v, e) h_k[v, i], with w the weights of `node_weights`.
 /// Terms are in the order of the energy that they contribute: the last ones may be left out. With a reflection E the
-/// above, to linear light, plus E(r), back to sRGB, is the colour; r = 2 (n·d) n - d, d the way to the eye, n the
+/// above, to linear light, plus E(r, n·d), back to sRGB, is the colour; r = 2 (n·d) n - d, d the way to the eye, n the
 /// normal interpolated from the corners'.
 struct LightField {
   TexturedMesh base;
