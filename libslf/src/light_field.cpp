@@ -26,7 +26,8 @@
 namespace lumihull::slf {
 namespace {
 
-constexpr double kLeastReflection = 0.1;  // of the variance that it must explain to be kept
+// What mirroring must explain to be kept: a share of the variance, and so much light.
+constexpr double kLeastReflection = 0.1, kLeastMirrored = 0.004;
 
 void check(const LightFieldOptions& o) {
   constexpr const char* kWhose = "light field options";
@@ -167,7 +168,7 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
   if (joint && options.reflections) {
     const ReflectionFit reflection = fit_reflection(mesh, atlas, samples, job);
     reflection_share = 1 - reflection.left;
-    if (reflection_share > kLeastReflection) {
+    if (reflection_share > kLeastReflection && reflection.explained_rms > kLeastMirrored) {
       take_off(reflection, mesh, atlas, samples, job);
       field.reflection = reflection_of(reflection);
     }

@@ -16,6 +16,7 @@ using Light = std::vector<Vector3f>;
 constexpr std::size_t kBlocksAtOnce = 512;
 constexpr int kRounds = 4, kSteps = 12;  // of the white samples' values; of conjugate gradients in each
 constexpr float kSmoothness = 0.02f, kTowardsZero = 0.002f;  // in shares of a node's mean weight
+constexpr std::size_t kSamples = 600'000;  // about so many are enough: all places share what is looked for
 constexpr std::uint8_t kWhite = 253;
 constexpr float kVisible = 0.02f;
 
@@ -43,6 +44,9 @@ class Fit {
   }
 
   const SphereGrid& grid() const { return grid_; }
+
+  /// From now on one texel of so many is looked at.
+  void thin(std::uint32_t stride) { stride_ = stride; }
 
   Vector3f at(const Light& light, const MirrorPlace& p) const {
     Vector3f sum = Vector3f::Zero();
@@ -79,7 +83,7 @@ class Fit {
       std::vector<Look> looks;
       const std::size_t last = std::min(atlas_.blocks.size() - 1, (chunk + 1) * kBlocksAtOnce);
       for (std::size_t b = chunk * kBlocksAtOnce; b < last; ++b)
-        for (std::uint32_t texel = atlas_.blocks[b]; texel < atlas_.blocks[b + 1]; ++texel) {
+        for (std::uint32_t texel = first_texel(b); texel < atlas_.blocks[b + 1]; texel += stride_) {
           looks.clear();
           for (const PhotoSamples& photo : photos_) {
             if (photo.first[b] == kUnseen) continue;
@@ -119,11 +123,16 @@ class Fit {
   }
 
  private:
+  std::uint32_t first_texel(std::size_t block) const {
+    return (atlas_.blocks[block] + stride_ - 1) / stride_ * stride_;
+  }
+
   const hull::Mesh& mesh_;
   const Atlas& atlas_;
   std::span<const PhotoSamples> photos_;
   const Light& normals_;
   SphereGrid grid_{kReflectionSide};
+  std::uint32_t stride_ = 1;
   std::vector<std::uint32_t> alias_;
   std::array<float, 256> light_of_;
 };
@@ -166,7 +175,12 @@ ReflectionFit fit_reflection(const hull::Mesh& mesh, const Atlas& atlas, std::sp
                              Job& job) {
   ReflectionFit out;
   out.normals = hull::vertex_normals(mesh);
-  const Fit fit(mesh, atlas, photos, out.normals);
+  for (auto& n : out.normals)
+    if (n.isZero()) n = Vector3f::UnitZ();  // no triangle with an area uses it
+  Fit fit(mesh, atlas, photos, out.normals);
+  std::size_t samples = 0;
+  for (const PhotoSamples& p : photos) samples += p.samples.size();
+  fit.thin(std::uint32_t(std::max<std::size_t>(1, samples / kSamples)));
   const std::size_t nodes = fit.grid().size(), size = 2 * nodes;
   Light x(size, Vector3f::Zero());
   float node_weight = 0;
@@ -220,17 +234,21 @@ ReflectionFit fit_reflection(const hull::Mesh& mesh, const Atlas& atlas, std::sp
     job.advance();
   }
   job.end();
-  std::vector<std::array<double, 2>> sums(fit.chunks(), {0, 0});
+  std::vector<std::array<double, 3>> sums(fit.chunks(), {0, 0, 0});
   fit.for_each_texel(job, x, [&](std::size_t chunk, std::vector<Look>& looks) {
     const Vector3f alone = Fit::mean(looks, [](const Look& l) { return l.color; });
-    for (const Look& l : looks) sums[chunk][0] += double(l.weight * (l.color - alone).squaredNorm());
+    for (const Look& l : looks) {
+      sums[chunk][0] += double(l.weight * (l.color - alone).squaredNorm());
+      sums[chunk][2] += double(l.weight);
+    }
     Fit::raise_white(looks);
     const Vector3f own = Fit::mean(looks, [](const Look& l) -> Vector3f { return l.color - l.mirrored_light; });
     for (const Look& l : looks) sums[chunk][1] += double(l.weight * (l.color - l.mirrored_light - own).squaredNorm());
   });
-  double before = 0, after = 0;
-  for (const auto& s : sums) before += s[0], after += s[1];
+  double before = 0, after = 0, weight = 0;
+  for (const auto& s : sums) before += s[0], after += s[1], weight += s[2];
   out.left = before > 0 ? after / before : 1;
+  out.explained_rms = weight > 0 ? std::sqrt(std::max(0.0, before - after) / (3 * weight)) : 0;
   out.light.resize(size);
   for (std::uint32_t i = 0; i < nodes; ++i) {
     out.light[i] = x[fit.grid().alias(i)];

@@ -18,7 +18,8 @@ struct ReflectionFit {
   std::vector<Eigen::Vector3f> normals;  ///< of the vertices, unit length: those that it is mirrored by
   /// Of a SphereGrid's nodes; then, as many, what comes on top where it is seen flatly, times grazing().
   std::vector<Eigen::Vector3f> light;
-  double left = 1;  ///< of the samples' variance about each texel's mean colour, the share that is left
+  double left = 1;           ///< of the samples' variance about each texel's mean colour, the share that is left
+  double explained_rms = 0;  ///< root mean square of the part that is not, linear light
 };
 
 inline constexpr int kReflectionSide = 64;
