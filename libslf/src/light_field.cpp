@@ -27,7 +27,7 @@ namespace lumihull::slf {
 namespace {
 
 // What mirroring must explain to be kept: a share of the variance, and so much light.
-constexpr double kLeastReflection = 0.1, kLeastMirrored = 0.004;
+constexpr double kLeastReflection = 1.0 / 3, kLeastMirrored = 0.004;
 
 void check(const LightFieldOptions& o) {
   constexpr const char* kWhose = "light field options";

@@ -145,7 +145,7 @@ const StageDefinition& evaluate_stage() {
            {},
            true},
           {"test_views",
-           "folder of test views as the virtual rig's truth/ has (cameras, pictures, true highlights); empty: none",
+           "folder of test views as the virtual rig's truth/ has (cameras, pictures, highlights alone); empty: none",
            std::string(),
            0,
            0,

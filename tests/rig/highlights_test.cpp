@@ -7,6 +7,7 @@
 #include <lumihull/slf/highlights.h>
 #include <lumihull/slf/metrics.h>
 #include <lumihull/slf/pipeline.h>
+#include <lumihull/slf/renderer.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -222,7 +223,9 @@ TEST(Highlights, APhotographIsTheSumOfItsParts) {
         const float sum = light_of(all.picture, x, y, c);
         EXPECT_NEAR(std::min(1.f, a + b), sum, .012) << x << ", " << y;  // each is rounded to a byte
         bright += b > .2f;
-        if (all.mask.row<std::uint8_t>(y)[x] == 0) EXPECT_EQ(b, 0);
+        if (all.mask.row<std::uint8_t>(y)[x] == 0) {
+          EXPECT_EQ(b, 0);
+        }
       }
   EXPECT_GT(bright, 20);
   ASSERT_EQ(all.mask.bytes(), without.mask.bytes());
