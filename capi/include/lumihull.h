@@ -477,7 +477,7 @@ typedef struct lh_truth_comparison lh_truth_comparison;
  * their covariances hold), lenses, targets, masks, the hull's surface, new views and the way of highlights. What either
  * side does not have is left out and named. The stage "evaluate" does the same where its option "truth" is set.
  *
- * @param truth cameras.json, targets.json, masks/NAME.png, mesh.ply, test_views.json, test_views/, test_highlights.json
+ * @param truth cameras.json, targets.json, masks/NAME.png, mesh.ply, test_views.json, test_views/
  * @return LH_ENOTFOUND: no such folder, or nothing of these in it; LH_EINPUT: a damaged file, or one that contradicts the
  *         capture (sizes, names)
  */

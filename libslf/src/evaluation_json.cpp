@@ -25,8 +25,8 @@ Json methods_json(const std::map<std::string, PictureQuality>& methods) {
 Json test_views_json(const TestViewEvaluation& views) {
   Json t = {{"views", views.views}, {"methods", methods_json(views.methods)}};
   for (const auto& [name, path] : views.highlights)
-    t["highlights"][name] = {{"lamp", path.lamp},
-                             {"views", path.views},
+    t["highlights"][name] = {{"tracks", path.tracks},
+                             {"places", path.places},
                              {"found", path.found},
                              {"true_length_px", number_json(path.true_length_px)},
                              {"share", number_json(path.share)},

@@ -1,11 +1,13 @@
 #include "judged_models.h"
 
 #include <lumihull/base/error.h>
+#include <lumihull/hull/mesh.h>
 #include <lumihull/slf/camera_path.h>
 #include <lumihull/slf/photos.h>
 
 #include <algorithm>
 #include <cstdlib>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -62,47 +64,39 @@ TestViewEvaluation evaluate_test_views(const fs::path& folder, const Methods& me
                                        const std::function<Pose(const Pose&)>& placed,
                                        const fs::path& folder_of_pictures, Job& job) {
   const std::vector<PathView> views = read_camera_path(folder / "test_views.json");
-  const fs::path truth_file = folder / "test_highlights.json";
-  std::vector<ViewHighlights> truth;
-  if (file_exists(truth_file)) truth = read_highlights(truth_file);
-  if (!truth.empty() && truth.size() != views.size())
-    throw Error(ErrorCode::bad_input, "expected the highlights of " + std::to_string(views.size()) + " views",
-                truth_file.string());
-  for (std::size_t i = 0; i < truth.size(); ++i)
-    if (truth[i].name != views[i].name)
-      throw Error(ErrorCode::bad_input,
-                  "expected the highlights of view \"" + views[i].name + "\", not of \"" + truth[i].name + "\"",
-                  truth_file.string());
+  const fs::path without = folder / "test_views" / "without_highlights", alone = folder / "test_views" / "highlights";
+  std::optional<HighlightJudge> judge;
+  if (!views.empty() && file_exists(folder / "mesh.ply") && file_exists(without / (views[0].name + ".png")))
+    judge.emplace(hull::read_mesh(folder / "mesh.ply"));
   if (!folder_of_pictures.empty()) fs::create_directories(folder_of_pictures);
   TestViewEvaluation out;
   out.views = views.size();
   MeanQualities means;
-  std::map<std::string, std::vector<Image>> pictures;
   for (const PathView& v : views) {
     job.check();
     const Image photo = test_picture(folder / "test_views" / (v.name + ".png"), v.view.camera, 3);
     const Image mask = test_picture(folder / "test_views" / "masks" / (v.name + ".png"), v.view.camera, 1);
     const Image reference = composited(photo, mask, background);
+    if (judge) {
+      const auto part = [&](const fs::path& of, const std::array<std::uint8_t, 3>& around) {
+        return composited(test_picture(of / (v.name + ".png"), v.view.camera, 3), mask, around);
+      };
+      judge->add_view(v.view, part(without, background), part(alone, {0, 0, 0}), reference);
+    }
     View view = v.view;
     if (placed) view.cam_from_world = placed(view.cam_from_world);
     std::map<std::string, PictureQuality> qualities;
     for (const auto& [name, render] : methods) {
-      Image picture = composited(render(view).rgba, background);
+      const Image picture = composited(render(view).rgba, background);
       qualities[name] = compare_pictures(picture, reference, mask);
       if (!folder_of_pictures.empty())
         write_png(folder_of_pictures / (v.name + "." + name + ".png"), side_by_side(reference, picture));
-      if (!truth.empty()) pictures[name].push_back(std::move(picture));
+      if (judge) judge->add_picture(name, picture);
     }
-    if (!truth.empty()) pictures["photograph"].push_back(reference);
     means.add(qualities);
   }
   out.methods = means.value();
-  try {
-    for (const auto& [name, of_method] : pictures)
-      out.highlights[name] = follow_highlight(of_method, pictures["photograph"], pictures["mean_texture"], truth);
-  } catch (const Error& e) {
-    if (e.code() != ErrorCode::degenerate) throw;  // no lamp is mirrored in two views in a row: nothing to follow
-  }
+  if (judge) out.highlights = judge->paths();
   return out;
 }
 

@@ -9,11 +9,13 @@
 #include <utility>
 
 #include "atlas.h"
+#include "byte_scale.h"
 #include "color.h"
 #include "exposure.h"
 #include "joint_fit.h"
 #include "light_field_terms.h"
 #include "photo_options.h"
+#include "reflection_fit.h"
 #include "ring_fit.h"
 #include "rings.h"
 #include "surface_fill.h"
@@ -23,6 +25,9 @@
 
 namespace lumihull::slf {
 namespace {
+
+// What mirroring must explain to be kept: a share of the variance, and so much light.
+constexpr double kLeastReflection = 1.0 / 3, kLeastMirrored = 0.004;
 
 void check(const LightFieldOptions& o) {
   constexpr const char* kWhose = "light field options";
@@ -46,6 +51,25 @@ std::vector<BlendColor> mean_colors(const hull::Mesh& mesh, const Atlas& atlas, 
   }
   filled = fill_surface(mesh, atlas, colors);
   return colors;
+}
+
+LightFieldReflection reflection_of(const ReflectionFit& fit) {
+  LightFieldReflection out;
+  out.normals = fit.normals;
+  const auto picture = [&](std::size_t first, ByteScale& scale) {
+    const std::span<const Eigen::Vector3f> light(&fit.light[first], std::size_t(kReflectionSide * kReflectionSide));
+    float low = 0, high = 0;
+    for (const auto& l : light) low = std::min(low, l.minCoeff()), high = std::max(high, l.maxCoeff());
+    scale = {std::max(high - low, 1e-6f), low};
+    Image map(kReflectionSide, kReflectionSide, 3);
+    for (std::size_t i = 0; i < light.size(); ++i)
+      for (std::size_t c = 0; c < 3; ++c)
+        map.row<std::uint8_t>(0)[3 * i + c] = to_byte(light[i][std::ptrdiff_t(c)], scale);
+    return map;
+  };
+  out.light = picture(0, out.light_scale);
+  out.grazing = picture(fit.light.size() / 2, out.grazing_scale);
+  return out;
 }
 
 std::vector<Eigen::Vector3f> nodes_of(const hull::Mesh& mesh, std::span<const PhotoSamples> samples, std::size_t most) {
@@ -78,6 +102,18 @@ void validate(const LightField& field, const std::string& name) {
         if (t[j] != t[(j + 1) % 3] && field.slot[t[j]] == field.slot[t[(j + 1) % 3]])
           fail("triangle " + std::to_string(i) + " has two corners of one slot");
     }
+  }
+  if (field.reflection) {
+    const LightFieldReflection& r = *field.reflection;
+    if (r.normals.size() != vertices) fail("reflection: expected a normal for each vertex");
+    for (const auto& n : r.normals)
+      if (!n.allFinite() || std::abs(n.norm() - 1) > 0.02f) fail("reflection: expected normals of unit length");
+    for (const Image* map : {&r.light, &r.grazing})
+      if (map->width() != map->height() || map->width() < 3 || map->width() > 1024 || map->width() != r.light.width() ||
+          map->channels() != 3 || map->type() != PixelType::u8)
+        fail("reflection: expected two square maps of 8-bit RGB, 3 to 1024 pixels a side");
+    for (const ByteScale& s : {r.light_scale, r.grazing_scale})
+      if (!std::isfinite(s.scale) || !std::isfinite(s.offset)) fail("reflection: scale and offset are not finite");
   }
   if (field.terms.size() > std::size_t(kMaxTerms)) fail("expected at most 12 terms");
   for (std::size_t k = 0; k < field.terms.size(); ++k) {
@@ -128,6 +164,15 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
   }
 
   LightField field;
+  double reflection_share = 0;
+  if (joint && options.reflections) {
+    const ReflectionFit reflection = fit_reflection(mesh, atlas, samples, job);
+    reflection_share = 1 - reflection.left;
+    if (reflection_share > kLeastReflection && reflection.explained_rms > kLeastMirrored) {
+      take_off(reflection, mesh, atlas, samples, job);
+      field.reflection = reflection_of(reflection);
+    }
+  }
   field.base.mesh = mesh;
   field.up = up_axis(photos.views).cast<float>();
   field.nodes = nodes_of(mesh, samples, std::size_t(options.max_nodes));
@@ -163,6 +208,7 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
     report->samples = 0;
     for (const PhotoSamples& p : samples) report->samples += p.samples.size();
     report->gains = std::move(gains);
+    report->reflection_share = reflection_share;
     report->rms = rms;
     report->rms_of_mean = fit.rms_of_mean;
   }

@@ -4,6 +4,7 @@
 #include <lumihull/slf/light_field_glb.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <span>
 #include <utility>
@@ -123,6 +124,22 @@ LightField light_field_of(const GlbFile& file) {
     if (slots.size() != vertices) extension.at("slots").fail("a byte for each vertex");
     field.slot.assign(slots.begin(), slots.end());
   }
+  if (extension.has("reflection")) {
+    const JsonReader json = extension.at("reflection");
+    LightFieldReflection& r = field.reflection.emplace();
+    const std::string_view normals = file.view(glb_index(json.at("normals")));
+    if (normals.size() != 3 * vertices) json.at("normals").fail("three bytes for each vertex");
+    for (std::size_t v = 0; v < vertices; ++v) {
+      const auto part = [&](std::size_t c) { return float(std::int8_t(normals[3 * v + c])); };
+      const Eigen::Vector3f n(part(0), part(1), part(2));
+      if (n.isZero()) json.at("normals").fail("normals that are not zero");
+      r.normals.push_back(n.normalized());
+    }
+    r.light = file.texture(glb_index(json.at("light")));
+    r.grazing = file.texture_like(r.light, glb_index(json.at("grazing")));
+    r.light_scale = scale_of(json.at("lightScale"));
+    r.grazing_scale = scale_of(json.at("grazingScale"));
+  }
   const JsonReader terms = extension.at("terms");
   const std::size_t count = terms.array_size(std::size_t(kMaxTerms));
   for (std::size_t k = 0; k < count; ++k) {
@@ -185,16 +202,28 @@ std::string encode_light_field(const LightField& field, const LightFieldFileOpti
     extension["slots"] = buffer.add_view(slots.data(), slots.size());
     maps = std::size_t(*std::max_element(slots.begin(), slots.end())) + 1;
   }
+  const auto add_picture = [&](const std::string& picture, bool jpeg) {
+    document["images"].push_back({{"bufferView", buffer.add_view(picture.data(), picture.size())},
+                                  {"mimeType", jpeg ? "image/jpeg" : "image/png"}});
+    document["textures"].push_back({{"source", document["images"].size() - 1}, {"sampler", 0}});
+    return document["textures"].size() - 1;
+  };
+  if (field.reflection) {
+    std::vector<std::int8_t> normals;
+    for (const std::uint32_t v : used)
+      for (int c = 0; c < 3; ++c) normals.push_back(std::int8_t(std::lround(127 * field.reflection->normals[v][c])));
+    extension["reflection"] = {{"normals", buffer.add_view(normals.data(), normals.size())},
+                               {"light", add_picture(encode_png(field.reflection->light), false)},
+                               {"lightScale", scale_json(field.reflection->light_scale)},
+                               {"grazing", add_picture(encode_png(field.reflection->grazing), false)},
+                               {"grazingScale", scale_json(field.reflection->grazing_scale)}};
+  }
   extension["terms"] = Json::array();
   for (const LightFieldTerm& term : field.terms) {
     Json surface = Json::array();
     for (const Image& map : std::span(term.surface).first(maps)) {
       const bool jpeg = options.map_quality > 0;
-      const std::string picture = jpeg ? encode_jpeg(map, options.map_quality) : encode_png(map);
-      document["images"].push_back({{"bufferView", buffer.add_view(picture.data(), picture.size())},
-                                    {"mimeType", jpeg ? "image/jpeg" : "image/png"}});
-      document["textures"].push_back({{"source", document["images"].size() - 1}, {"sampler", 0}});
-      surface.push_back(document["textures"].size() - 1);
+      surface.push_back(add_picture(jpeg ? encode_jpeg(map, options.map_quality) : encode_png(map), jpeg));
     }
     std::vector<std::uint8_t> view;
     view.reserve(used.size() * field.nodes.size());

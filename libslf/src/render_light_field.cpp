@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "render_with.h"
+#include "sphere_grid.h"
 #include "view_nodes.h"
 
 #ifdef __AVX2__
@@ -133,6 +134,17 @@ LightFieldRenderer::LightFieldRenderer(const LightField& field, int terms)
   for (std::size_t s = 0; s < slots; ++s)
     for (std::size_t k = 0; k < terms_; ++k) place(field.terms[k].surface[s], 3 * (1 + s * terms_ + k));
 
+  if (field.reflection) {
+    const LightFieldReflection& r = *field.reflection;
+    normals_ = r.normals;
+    for (const auto& [map, scale] : {std::pair(&r.light, r.light_scale), {&r.grazing, r.grazing_scale}})
+      for (int y = 0; y < map->height(); ++y)
+        for (int x = 0; x < map->width(); ++x) {
+          const std::uint8_t* b = map->row<std::uint8_t>(y) + 3 * x;
+          mirrored_light_.push_back(scale.scale / 255 * Eigen::Vector3f(b[0], b[1], b[2]) +
+                                    Eigen::Vector3f::Constant(scale.offset));
+        }
+  }
   const std::size_t vertices = mesh_.vertices.size();
   view_.resize(vertices * nodes_.size() * terms_);
   for (std::size_t k = 0; k < terms_; ++k) {
@@ -173,6 +185,25 @@ Rendering LightFieldRenderer::render(const View& view, const RenderOptions& opti
     std::fill_n(&scale[3 * k], 3, map_scales_[k].scale / 255);
     std::fill_n(&offset[3 * k], 3, map_scales_[k].offset);
   }
+  const SphereGrid sphere(std::max(3, int(std::lround(std::sqrt(double(mirrored_light_.size() / 2))))));
+  const Eigen::Vector3f eye = view.center().cast<float>();
+  const auto mirror = [&](const SurfaceSample& s, float* color) {
+    const auto& t = mesh_.triangles[s.hit.triangle];
+    const float b0 = 1 - s.hit.b1 - s.hit.b2;
+    const auto between = [&](const std::vector<Eigen::Vector3f>& of) -> Eigen::Vector3f {
+      return b0 * of[t[0]] + s.hit.b1 * of[t[1]] + s.hit.b2 * of[t[2]];
+    };
+    const Eigen::Vector3f to_eye = (eye - between(mesh_.vertices)).stableNormalized(),
+                          normal = between(normals_).stableNormalized();
+    const SphereGrid::Place at = sphere.at(mirrored(to_eye, normal));
+    const float flat = grazing(to_eye.dot(normal));
+    Eigen::Vector3f light = Eigen::Vector3f::Zero();
+    for (std::size_t k = 0; k < 4; ++k)
+      light += at.weight[k] * (mirrored_light_[at.node[k]] + flat * mirrored_light_[sphere.size() + at.node[k]]);
+    for (int c = 0; c < 3; ++c)
+      color[c] =
+          srgb_from_linear(std::clamp(linear_from_srgb(std::clamp(color[c], 0.0f, 1.0f)) + light[c], 0.0f, 1.0f));
+  };
   return render_with(
       view, options, scene_, mesh_, job,
       [&](const SurfaceSample& s) {
@@ -215,6 +246,7 @@ Rendering LightFieldRenderer::render(const View& view, const RenderOptions& opti
             add(3 * (1 + slot_[t[j]] * terms_), coefficients);
           }
         }
+        if (!normals_.empty()) mirror(s, color);
         return BlendColor{color[0], color[1], color[2], 1};
       },
       edges_.get());

@@ -65,9 +65,9 @@ void add_each(std::string& page, const Evaluation& e) {
 void add_test_views(std::string& page, const TestViewEvaluation& t) {
   page += "<h3>Test views</h3>\n<p>Means over " + std::to_string(t.views) +
           " views that are no photographs of the capture" +
-          (t.highlights.empty() ? "" : "; highlight: how it moves from view to view") +
+          (t.highlights.empty() ? "" : "; highlights: how they move over the surface from view to view") +
           ".</p>\n<div class=\"scroll\"><table><tr><th>method</th><th>PSNR, dB</th><th>PSNR inside</th>"
-          "<th>highlight seen</th><th>of its way</th><th>off by</th></tr>\n";
+          "<th>highlights seen</th><th>of their way</th><th>off by</th></tr>\n";
   std::set<std::string> names;
   for (const auto& [name, q] : t.methods) names.insert(name);
   for (const auto& [name, path] : t.highlights) names.insert(name);
@@ -80,7 +80,7 @@ void add_test_views(std::string& page, const TestViewEvaluation& t) {
                                        formatted("%.2f", q->second.psnr_inside) + "</td>";
     page += path == t.highlights.end()
                 ? "<td></td><td></td><td></td>"
-                : "<td>" + std::to_string(path->second.found) + " of " + std::to_string(path->second.views) +
+                : "<td>" + std::to_string(path->second.found) + " of " + std::to_string(path->second.places) +
                       "</td><td>" + formatted("%.0f %%", 100 * path->second.share) + "</td><td>" +
                       formatted("%.1f px", path->second.rms_px) + "</td>";
     page += "</tr>\n";

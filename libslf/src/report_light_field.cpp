@@ -29,7 +29,8 @@ std::string counted(std::size_t n, const char* what) { return std::to_string(n) 
 
 std::string in_words(const LightField& field, std::uint64_t bytes) {
   std::string text = counted(field.base.mesh.triangles.size(), "triangle") + ", " +
-                     counted(field.terms.size(), "term") + (field.adds_base ? " beyond the mean colour" : "");
+                     counted(field.terms.size(), "term") + (field.adds_base ? " beyond the mean colour" : "") +
+                     (field.reflection ? " and what all places mirror alike" : "");
   if (!field.terms.empty()) {
     const std::size_t slots = field.terms[0].surface.size();
     text += ", maps of " + std::to_string(field.base.texture.width()) + " × " +

@@ -42,11 +42,11 @@ void inputs(const Capture& capture, InputDigest& digest) {
   if (capture.background_rgb)
     digest.add("background", {reinterpret_cast<const char*>(capture.background_rgb->data()), 3});
   if (const std::filesystem::path folder = test_folder(capture); !folder.empty())
-    for (const char* file : {"test_views.json", "test_highlights.json"}) digest.add_file(file, folder / file);
+    for (const char* file : {"test_views.json", "mesh.ply"}) digest.add_file(file, folder / file);
   if (const std::filesystem::path folder = truth_folder(capture); !folder.empty()) {
     digest.add_file("hull", capture.hull_path());
     digest.add_file("target model", calib::target_model_path(capture));
-    for (const char* file : {"cameras.json", "targets.json", "mesh.ply", "test_views.json", "test_highlights.json"})
+    for (const char* file : {"cameras.json", "targets.json", "mesh.ply", "test_views.json"})
       digest.add_file(std::string("true ") + file, folder / file);
     for (const Shot& shot : capture.shots)
       digest.add_file("true mask " + shot.name, folder / "masks" / (shot.name + ".png"));
@@ -112,8 +112,8 @@ std::vector<std::string> run(Capture& capture, Job& job) {
     said.emplace_back(line);
   }
   for (const auto& [method, path] : evaluation.test_views.highlights) {
-    std::snprintf(line, sizeof line, "%-13s highlight: in %zu of %zu views, along %.0f %% of its way, %.1f px off",
-                  method.c_str(), path.found, path.views, 100 * path.share, path.rms_px);
+    std::snprintf(line, sizeof line, "%-13s highlights: %zu of %zu, along %.0f %% of their way, %.1f px off",
+                  method.c_str(), path.found, path.places, 100 * path.share, path.rms_px);
     said.emplace_back(line);
   }
   internal::Json json = internal::parse_json(evaluation.to_json(), "evaluation");
@@ -145,7 +145,7 @@ const StageDefinition& evaluate_stage() {
            {},
            true},
           {"test_views",
-           "folder of test views as the virtual rig's truth/ has (cameras, pictures, true highlights); empty: none",
+           "folder of test views as the virtual rig's truth/ has (cameras, pictures, highlights alone); empty: none",
            std::string(),
            0,
            0,

@@ -57,6 +57,7 @@ std::vector<std::string> run(Capture& capture, Job& job) {
   options.max_nodes = integer("nodes");
   options.max_side = integer("map_side");
   options.texel_px = effective<double>(capture, "lightfield", "map_px");
+  options.reflections = effective<bool>(capture, "lightfield", "reflections");
   options.even_exposure = effective<bool>(capture, "lightfield", "even_exposure");
   LightFieldFileOptions file_options;
   file_options.texture_quality = integer("texture_quality");
@@ -75,6 +76,11 @@ std::vector<std::string> run(Capture& capture, Job& job) {
                 "%.1f million samples, met to %.1f of 255 (mean colour alone: %.1f); %.1f %% of the surface unseen",
                 double(report.samples) / 1e6, 255 * report.rms, 255 * report.rms_of_mean, 100 * report.unseen_share);
   said.emplace_back(line);
+  if (options.reflections) {
+    std::snprintf(line, sizeof line, "mirroring explains %.1f %% of what changes with the direction: %s",
+                  100 * report.reflection_share, field.reflection ? "kept" : "left out");
+    said.emplace_back(line);
+  }
   if (!report.gains.empty()) {
     float least = report.gains[0].minCoeff(), most = report.gains[0].maxCoeff();
     for (const auto& g : report.gains) least = std::min(least, g.minCoeff()), most = std::max(most, g.maxCoeff());
@@ -108,6 +114,7 @@ const StageDefinition& lightfield_stage() {
           {"map_px", "size of a texel of the surface maps in pixels of the photographs", defaults.texel_px, 0.1, 100},
           {"map_side", "largest width and height of the surface maps, px", std::int64_t(defaults.max_side), 64, 16384},
           {"nodes", "places where view maps have values, at most", std::int64_t(defaults.max_nodes), 4, kMaxNodes},
+          {"reflections", "look for what all places mirror alike (joint)", defaults.reflections},
           {"even_exposure", "even out exposure and white balance between the photographs", defaults.even_exposure},
           {"despill", "share of the enclosure's hue that is taken off the photographs, 0 to 1; needs key.json", 0.0, 0,
            1},

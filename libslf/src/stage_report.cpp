@@ -50,9 +50,9 @@ TestViewEvaluation read_test_views(const JsonReader& json) {
   for (const auto& item : highlights.value().items()) {
     const JsonReader h = highlights.at(item.key());
     HighlightPath& path = out.highlights[item.key()];
-    path.lamp = int(h.at("lamp").integer(0, 1'000'000));
-    path.views = std::size_t(h.at("views").integer(0, 1'000'000));
-    path.found = std::size_t(h.at("found").integer(0, 1'000'000));
+    path.tracks = std::size_t(h.at("tracks").integer(0, 1'000'000'000));
+    path.places = std::size_t(h.at("places").integer(0, 1'000'000'000));
+    path.found = std::size_t(h.at("found").integer(0, 1'000'000'000));
     path.true_length_px = number_or_nan(h, "true_length_px");
     path.share = number_or_nan(h, "share");
     path.rms_px = number_or_nan(h, "rms_px");

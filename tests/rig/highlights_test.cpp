@@ -1,4 +1,13 @@
+#include <lumihull/base/files.h>
+#include <lumihull/hull/simplify.h>
 #include <lumihull/rig/highlights.h>
+#include <lumihull/rig/rig_capture.h>
+#include <lumihull/slf/camera_path.h>
+#include <lumihull/slf/glb.h>
+#include <lumihull/slf/highlights.h>
+#include <lumihull/slf/metrics.h>
+#include <lumihull/slf/pipeline.h>
+#include <lumihull/slf/renderer.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -189,6 +198,80 @@ TEST(Highlights, ABumpyThingHasSeveralTheStrongestFirst) {
       EXPECT_NE(found[i].point, found[i - 1].point);
     }
   }
+}
+
+float light_of(const Image& picture, int x, int y, int channel) {
+  return linear_from_srgb(float(picture.row<std::uint8_t>(y)[3 * x + channel]) / 255);
+}
+
+TEST(Highlights, APhotographIsTheSumOfItsParts) {
+  const Scene scene = make_scene(make_pebble(.6, 4), kGreenPaint, true, 3);
+  Job job;
+  const Photographer photographer(scene, test::coarse_light(), job);
+  PhotoOptions options = test::noiseless();
+  const View view = test::view_of(scene, default_camera(240), 1);
+  const auto take = [&](Shown shown) {
+    options.shown = shown;
+    return photographer.photograph(view, options, 1, job);
+  };
+  const Photo all = take(Shown::all), without = take(Shown::without_highlights), alone = take(Shown::highlights_alone);
+  int bright = 0;
+  for (int y = 0; y < all.picture.height(); ++y)
+    for (int x = 0; x < all.picture.width(); ++x)
+      for (int c = 0; c < 3; ++c) {
+        const float a = light_of(without.picture, x, y, c), b = light_of(alone.picture, x, y, c);
+        const float sum = light_of(all.picture, x, y, c);
+        EXPECT_NEAR(std::min(1.f, a + b), sum, .012) << x << ", " << y;  // each is rounded to a byte
+        bright += b > .2f;
+        if (all.mask.row<std::uint8_t>(y)[x] == 0) {
+          EXPECT_EQ(b, 0);
+        }
+      }
+  EXPECT_GT(bright, 20);
+  ASSERT_EQ(all.mask.bytes(), without.mask.bytes());
+  EXPECT_EQ(std::memcmp(all.mask.data(), without.mask.data(), all.mask.bytes()), 0);
+}
+
+/// The bust has many highlights of each lamp, that come, go and pass one another.
+TEST(Highlights, PhotographsOfABustFollowThemAndItsMeanColourDoesNot) {
+  const test::TemporaryFolder folder;
+  Job job;
+  RigOptions o;
+  o.object = "bust";
+  o.photos = 16, o.empty_photos = 1, o.test_views = 6;
+  o.width = 480;
+  o.light = test::coarse_light();
+  Capture capture = make_capture(folder / "c", o, job);
+  const std::filesystem::path truth = folder / "c" / "truth", views = truth / "test_views";
+  for (std::size_t i = 0; i < capture.shots.size(); ++i)
+    capture.write_mask(i, read_image(truth / "masks" / (capture.shots[i].name + ".png")), MaskSource::imported);
+  const hull::Mesh mesh = hull::read_mesh(truth / "mesh.ply");
+  hull::write_mesh(capture.hull_path(), hull::simplify(mesh, {6000, 0}, job).mesh);
+  slf::run_stage(capture, "texture", job);
+  const slf::TexturedMesh mean = slf::read_glb(folder / "c" / "textured.glb");
+  const hull::RayScene scene(mean.mesh);
+  slf::HighlightJudge judge(mesh);
+  for (const slf::PathView& v : slf::read_camera_path(truth / "test_views.json")) {
+    const Image mask = read_image(views / "masks" / (v.name + ".png"));
+    const auto picture = [&](const char* of) {
+      return slf::composited(read_image(views / of / (v.name + ".png")), mask, {0, 0, 0});
+    };
+    // As a camera would deliver it.
+    write_file(folder / "photograph.jpg", encode_jpeg(read_image(views / (v.name + ".png")), 90));
+    const Image photograph = read_image(folder / "photograph.jpg");
+    judge.add_view(v.view, picture("without_highlights"), picture("highlights"),
+                   slf::composited(photograph, mask, {0, 0, 0}));
+    judge.add_picture("mean",
+                      slf::composited(slf::render_texture(mean, scene, v.view, {2, false}, job).rgba, {0, 0, 0}));
+  }
+  const auto paths = judge.paths();
+  ASSERT_EQ(paths.count("mean"), 1u);
+  const slf::HighlightPath &photograph = paths.at("photograph"), &texture = paths.at("mean");
+  EXPECT_GT(photograph.tracks, 8u);
+  EXPECT_GT(photograph.true_length_px, 100);
+  EXPECT_GT(photograph.share, .95);
+  EXPECT_LT(photograph.rms_px, 1);
+  EXPECT_LT(texture.share, .12) << texture.found << " of " << texture.places;
 }
 
 }  // namespace

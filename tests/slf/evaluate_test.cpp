@@ -285,7 +285,7 @@ TEST(Report, ShowsTheLightField) {
   slf::run_stage(capture, "report", job);
   const std::string page = read_file(folder / "capture" / "report.html");
   using testing::HasSubstr;
-  EXPECT_THAT(page, HasSubstr(" triangles, 2 terms beyond the mean colour, maps of "));
+  EXPECT_THAT(page, HasSubstr(" triangles, 1 term beyond the mean colour and what all places mirror alike, maps of "));
   char size[40];
   std::snprintf(size, sizeof size, "%.1f MB", double(fs::file_size(folder / "capture" / "light_field.glb")) / 1e6);
   EXPECT_THAT(page, HasSubstr("<tr><td>light field</td><td>" + std::string(size) + "</td>"));
@@ -371,8 +371,8 @@ TEST(Report, TellsHowHighlightsMove) {
   e.mean.methods["light_field"] = {30, 0.9, 20, 0.8};
   e.test_views.views = 24;
   e.test_views.methods["light_field"] = {31.25, 0.9, 21.75, 0.8};
-  e.test_views.highlights["light_field"] = {1, 23, 19, 400, 0.81, 12.25};
-  e.test_views.highlights["photograph"] = {1, 23, 23, 400, 0.97, 2};
+  e.test_views.highlights["light_field"] = {2, 23, 19, 400, 0.81, 12.25};
+  e.test_views.highlights["photograph"] = {2, 23, 23, 400, 0.97, 2};
   fs::create_directories(folder / "capture" / "evaluate");
   write_file(folder / "capture" / "evaluate" / "evaluation.json", e.to_json());
   Job job;

@@ -1,94 +1,172 @@
-#include <lumihull/base/files.h>
 #include <lumihull/slf/highlights.h>
 
 #include <cmath>
+#include <functional>
 
 #include "support.h"
+#include "synthetic.h"
 
 namespace lumihull {
 namespace {
 
-/// A grey picture with a soft white spot.
-Image spot(const Eigen::Vector2d& at, double strength) {
-  Image image(120, 100, 3);
-  for (int y = 0; y < 100; ++y)
-    for (int x = 0; x < 120; ++x)
-      for (int c = 0; c < 3; ++c)
-        image.row<std::uint8_t>(y)[3 * x + c] = std::uint8_t(
-            60 + 150 * strength * std::exp(-(Eigen::Vector2d(x + 0.5, y + 0.5) - at).squaredNorm() / (2 * 9)));
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr int kViews = 6;
+
+/// A wall, z = 0, past which the camera moves, and two highlights that move over it, one faster than the other.
+hull::Mesh wall() {
+  hull::Mesh mesh;
+  mesh.vertices = {{-3, -3, 0}, {3, -3, 0}, {3, 3, 0}, {-3, 3, 0}};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return mesh;
+}
+
+View view(int i) {
+  Pose pose;
+  pose.translation = Vector3d(0.1 - 0.04 * i, 0, 2);
+  return {test::camera(400, 300, 400), pose};
+}
+
+Vector3d first(double i) { return {-0.35 + 0.05 * i, -0.3, 0}; }
+Vector3d second(double i) { return {0.3, 0.3 - 0.04 * i, 0}; }
+
+struct Spot {
+  Vector3d place;
+  double strength;
+};
+
+/// Spots of light, alone or on top of grey paint.
+Image picture(int i, const std::vector<Spot>& spots, bool alone = false) {
+  Image image(400, 300, 3);
+  std::vector<float> light(400 * 300, alone ? 0 : 0.2f);
+  for (const Spot& s : spots) {
+    const Vector2d middle = *view(i).project(s.place);
+    for (int y = std::max(0, int(middle.y()) - 20); y < std::min(300, int(middle.y()) + 20); ++y)
+      for (int x = std::max(0, int(middle.x()) - 20); x < std::min(400, int(middle.x()) + 20); ++x)
+        light[std::size_t(400 * y + x)] +=
+            float(s.strength * std::exp(-(Vector2d(x + 0.5, y + 0.5) - middle).squaredNorm() / (2 * 3.5 * 3.5)));
+  }
+  for (std::size_t k = 0; k < light.size(); ++k) {
+    const auto byte = std::byte(255 * srgb_from_linear(std::min(light[k], 1.0f)) + 0.5f);
+    for (std::size_t c = 0; c < 3; ++c) image.data()[3 * k + c] = byte;
+  }
   return image;
 }
 
-struct Case {
-  std::vector<slf::ViewHighlights> truth;
-  std::vector<Image> photographs, matt;
-};
+/// Now this, now that one is the strongest.
+std::vector<Spot> truth(int i) { return {{first(i), i % 2 ? 0.5 : 0.3}, {second(i), 0.4}}; }
 
-Case moving() {
-  Case c;
-  for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector2d at(30 + 6 * i, 40 + 2 * i);
-    c.truth.push_back({"view" + std::to_string(i), {{1, at, 0.5}, {0, {10, 10}, 0.1}}});
-    c.photographs.push_back(spot(at, 1));
-    c.matt.push_back(spot({0, 0}, 0));
+using Method = std::function<std::vector<Spot>(int)>;
+
+std::map<std::string, slf::HighlightPath> judged(const Method& method) {
+  slf::HighlightJudge judge(wall());
+  for (int i = 0; i < kViews; ++i) {
+    judge.add_view(view(i), picture(i, {}), picture(i, truth(i), true), picture(i, truth(i)));
+    judge.add_picture("method", picture(i, method(i)));
   }
-  return c;
+  return judge.paths();
 }
 
-slf::HighlightPath followed(const Case& c, const std::vector<Image>& pictures) {
-  return slf::follow_highlight(pictures, c.photographs, c.matt, c.truth);
+TEST(HighlightJudge, PhotographsGoTheWholeWayWhicheverIsTheStrongest) {
+  const auto paths = judged(truth);
+  for (const char* name : {"photograph", "method"}) {
+    const slf::HighlightPath& path = paths.at(name);
+    EXPECT_EQ(path.tracks, 2u);
+    EXPECT_EQ(path.places, 2u * kViews);
+    EXPECT_EQ(path.found, path.places);
+    // 400 px / 2 m: 10 and 8 px a view over the wall, whatever way the camera goes.
+    EXPECT_NEAR(path.true_length_px, (kViews - 1) * 18, 1);
+    EXPECT_GT(path.share, 0.98);
+    EXPECT_LT(path.rms_px, 0.2);
+  }
 }
 
-TEST(FollowHighlight, TruePicturesFollowTheWholeWay) {
-  const Case c = moving();
-  const slf::HighlightPath path = followed(c, c.photographs);
-  EXPECT_EQ(path.lamp, 1);
-  EXPECT_EQ(path.views, 8u);
-  EXPECT_EQ(path.found, 8u);
-  EXPECT_NEAR(path.true_length_px, 7 * std::hypot(6, 2), 1e-9);
-  EXPECT_GT(path.share, 0.99);
-  EXPECT_LT(path.rms_px, 0.2);
+TEST(HighlightJudge, HalfTheSpeedIsHalfTheWay) {
+  const double middle = (kViews - 1) / 2.;
+  for (const double speed : {0.25, 0.5, 0.75}) {
+    const auto at = [&](int i) { return middle + speed * (i - middle); };
+    const auto paths = judged([&](int i) -> std::vector<Spot> { return {{first(at(i)), 0.4}, {second(at(i)), 0.4}}; });
+    // At the ends of the way they are too far behind to be found.
+    const slf::HighlightPath& path = paths.at("method");
+    if (speed < 0.5)
+      EXPECT_LT(path.share, speed + 0.03);
+    else
+      EXPECT_NEAR(path.share, speed, 0.03) << path.found;
+  }
 }
 
-TEST(FollowHighlight, WhatStandsStillOrIsMissingDoesNot) {
-  const Case c = moving();
-  const slf::HighlightPath none = followed(c, c.matt);
+TEST(HighlightJudge, WhatIsPaintedOnTheSurfaceGoesNoWay) {
+  // It moves in the picture, as the camera does, and some of it is always near a true highlight.
+  std::vector<Spot> paint;
+  for (int k = 0; k < kViews; ++k) paint.push_back({first(k), 0.35}), paint.push_back({second(k), 0.35});
+  for (const double spacing : {0.12, 0.25}) {
+    std::vector<Spot> apart;
+    for (double k = -5; k < 6; ++k)
+      apart.push_back({{spacing * k, -0.3, 0}, 0.35}), apart.push_back({{0.3, spacing * k, 0}, 0.35});
+    const auto path = judged([&](int) { return apart; }).at("method");
+    EXPECT_GT(path.found, path.places / 3);
+    EXPECT_LT(path.share, 0.03) << spacing;
+  }
+  EXPECT_LT(judged([&](int) { return paint; }).at("method").share, 0.05);
+}
+
+TEST(HighlightJudge, WhatFadesFromOnePlaceToTheNextDoesNotMove) {
+  // As photographs of every third view, blended.
+  const auto path = judged([](int i) -> std::vector<Spot> {
+                      const int before = i / 3 * 3;
+                      const double part = (i - before) / 3.;
+                      return {{first(before), 0.4 * (1 - part)},
+                              {first(before + 3), 0.4 * part},
+                              {second(before), 0.4 * (1 - part)},
+                              {second(before + 3), 0.4 * part}};
+                    }).at("method");
+  EXPECT_GT(path.found, path.places / 2);
+  EXPECT_LT(path.share, 0.45);  // one step of three, when the other one is nearer
+}
+
+TEST(HighlightJudge, WhatIsMissingOrWeakIsNotFound) {
+  const auto none = judged([](int) { return std::vector<Spot>(); }).at("method");
   EXPECT_EQ(none.found, 0u);
   EXPECT_EQ(none.share, 0);
-  const std::vector<Image> still(8, spot({51, 47}, 1));
-  EXPECT_LT(followed(c, still).share, 0.05);
-  std::vector<Image> weak;
-  for (const auto& view : c.truth) weak.push_back(spot(view.highlights[0].pixel, 0.2));
-  EXPECT_EQ(followed(c, weak).found, 0u);
+  const auto weak = judged([](int i) -> std::vector<Spot> { return {{first(i), 0.06}, {second(i), 0.06}}; });
+  EXPECT_EQ(weak.at("method").found, 0u);
+  const auto one = judged([](int i) -> std::vector<Spot> { return {{first(i), 0.4}}; }).at("method");
+  EXPECT_EQ(one.found, std::size_t(kViews));
+  EXPECT_NEAR(one.share, 0.5, 0.1);
 }
 
-TEST(FollowHighlight, HalfTheSpeedIsHalfTheWay) {
-  const Case c = moving();
-  std::vector<Image> slow;
-  for (int i = 0; i < 8; ++i) slow.push_back(spot({51 + 3 * (i - 3.5), 47 + (i - 3.5)}, 1));
-  const slf::HighlightPath path = followed(c, slow);
-  // At its ends it is out of reach: 8 % of the picture's shorter side.
-  EXPECT_GT(path.share, 0.2);
-  EXPECT_LT(path.share, 0.55);
+TEST(HighlightJudge, WhatThePhotographsDoNotShowIsNotAsked) {
+  slf::HighlightJudge judge(wall());
+  for (int i = 0; i < kViews; ++i)
+    judge.add_view(view(i), picture(i, {}), picture(i, truth(i), true), picture(i, {truth(i)[1]}));
+  const auto paths = judge.paths();
+  ASSERT_EQ(paths.size(), 1u);
+  EXPECT_EQ(paths.at("photograph").tracks, 1u);
+  EXPECT_NEAR(paths.at("photograph").true_length_px, (kViews - 1) * 8, 1);
+
+  slf::HighlightJudge nothing(wall());
+  for (int i = 0; i < 2; ++i) nothing.add_view(view(i), picture(i, {}), picture(i, {}, true), picture(i, {}));
+  EXPECT_TRUE(nothing.paths().empty());
 }
 
-TEST(FollowHighlight, ReadsTheTruthAndSaysWhatIsWrong) {
-  const test::TemporaryFolder folder;
-  write_file(folder / "good.json", R"({"format": "lumihull-highlights", "version": 1, "shots": [{"name": "a",
-    "highlights": [{"lamp": 2, "point": [1, 2, 3], "pixel": [4.5, 5.5], "strength": 0.25}]}, {"name": "b", "highlights": []}]})");
-  const auto read = slf::read_highlights(folder / "good.json");
-  ASSERT_EQ(read.size(), 2u);
-  ASSERT_EQ(read[0].highlights.size(), 1u);
-  EXPECT_EQ(read[0].highlights[0].lamp, 2);
-  EXPECT_EQ(read[0].highlights[0].pixel, Eigen::Vector2d(4.5, 5.5));
-  write_file(folder / "bad.json", R"({"format": "lumihull-highlights", "version": 1, "shots": [{"name": "a",
-    "highlights": [{"lamp": 2, "pixel": [4.5], "strength": 0.25}]}]})");
-  const Error e = test::expect_error([&] { slf::read_highlights(folder / "bad.json"); });
-  EXPECT_EQ(e.code(), ErrorCode::bad_input);
-  EXPECT_THAT(e.message(), testing::HasSubstr("/shots/0/highlights/0/pixel"));
-  const Case c = moving();
-  EXPECT_EQ(test::expect_error([&] { followed(c, {c.matt[0]}); }).code(), ErrorCode::invalid_argument);
-  EXPECT_EQ(test::expect_error([&] { slf::follow_highlight({}, {}, {}, {}); }).code(), ErrorCode::degenerate);
+TEST(HighlightJudge, SaysWhatItNeeds) {
+  slf::HighlightJudge judge(wall());
+  const auto refused = [](const std::function<void()>& act) {
+    EXPECT_EQ(test::expect_error(act).code(), ErrorCode::invalid_argument);
+  };
+  refused([&] { judge.add_picture("method", picture(0, {})); });
+  refused([&] { judge.add_view(view(0), picture(0, {}), Image(400, 300, 1), picture(0, {})); });
+  refused([&] { judge.add_view(view(0), picture(0, {}), picture(0, {}), Image(300, 400, 3)); });
+  judge.add_view(view(0), picture(0, {}), picture(0, truth(0), true), picture(0, truth(0)));
+  refused([&] { judge.add_picture("photograph", picture(0, {})); });
+  refused([&] { judge.add_picture("method", Image(10, 10, 3)); });
+  judge.add_picture("method", picture(0, {}));
+  refused([&] { judge.add_picture("method", picture(0, {})); });
+  judge.add_view(view(1), picture(1, {}), picture(1, truth(1), true), picture(1, truth(1)));
+  judge.add_view(view(2), picture(2, {}), picture(2, truth(2), true), picture(2, truth(2)));
+  refused([&] { judge.add_picture("method", picture(2, {})); });
+  EXPECT_EQ(judge.paths().count("method"), 0u);
 }
 
 }  // namespace

@@ -33,6 +33,14 @@ slf::LightField made_up(bool slots) {
   field.base.texture = picture();
   field.up = Eigen::Vector3f(0, 0.6f, 0.8f);
   field.nodes = {{1, 2, 3}, {-4, 5, 6}, {7, -8, 9}};
+  if (!slots) {
+    auto& r = field.reflection.emplace();
+    for (const auto& v : field.base.mesh.vertices) r.normals.push_back(v.normalized());
+    r.light = r.grazing = Image(5, 5, 3);
+    for (std::size_t i = 0; i < r.light.bytes(); ++i)
+      r.light.data()[i] = std::byte(random() % 256), r.grazing.data()[i] = std::byte(random() % 256);
+    r.light_scale = {0.75f, -0.125f}, r.grazing_scale = {2, -1};
+  }
   std::size_t maps = 1;
   if (slots) {  // every vertex apart from its neighbours
     field.adds_base = false;
@@ -118,6 +126,15 @@ TEST(LightFieldGlb, ComesBackAsItWas) {
       for (std::size_t i = 0; i < back.terms[k].surface.size(); ++i)
         expect_equal(back.terms[k].surface[i], field.terms[k].surface[i]);
     }
+    ASSERT_EQ(back.reflection.has_value(), !slots);
+    if (!slots) {
+      expect_equal(back.reflection->light, field.reflection->light);
+      expect_equal(back.reflection->grazing, field.reflection->grazing);
+      EXPECT_EQ(back.reflection->light_scale.offset, field.reflection->light_scale.offset);
+      EXPECT_EQ(back.reflection->grazing_scale.scale, field.reflection->grazing_scale.scale);
+      for (std::size_t v = 0; v < back.reflection->normals.size(); ++v)  // three bytes each
+        EXPECT_LT((back.reflection->normals[v] - field.reflection->normals[v]).norm(), 0.01f);
+    }
     EXPECT_EQ(slf::encode_light_field(back, {.texture_quality = 0, .map_quality = 0}),
               slf::encode_light_field(field, {.texture_quality = 0, .map_quality = 0}));
   }
@@ -159,7 +176,9 @@ TEST(LightFieldGlb, WhatTheFormatAsksOfAFileHoldsForWhatTheExtensionAdds) {
         const json& view = d["bufferViews"].at(image["bufferView"].get<std::size_t>());
         const bool png = parts.binary.substr(view["byteOffset"].get<std::size_t>(), 4) == "\x89PNG";
         EXPECT_EQ(image["mimeType"], png ? "image/png" : "image/jpeg");
-        EXPECT_EQ(png, quality == 0 && &texture != &d["textures"][0]);  // the texture itself is a JPEG here
+        const std::size_t i = std::size_t(&texture - &d["textures"][0]);
+        // The texture itself is a JPEG here; what is mirrored never is.
+        EXPECT_EQ(png, i > 0 && (quality == 0 || (!slots && i < 3)));
       }
     }
 }
@@ -171,6 +190,7 @@ TEST(LightFieldGlb, LeavesOutVerticesThatNobodyUsesAndTheirMaps) {
     const slf::LightField before = field;
     field.base.mesh.vertices.push_back({9, 9, 9});
     if (slots) field.slot.push_back(std::uint8_t(field.terms[0].surface.size()));
+    if (field.reflection) field.reflection->normals.push_back({0, 0, 1});
     for (auto& term : field.terms) {
       if (slots) term.surface.push_back(term.surface[0]);
       std::vector<std::uint8_t> longer;
@@ -250,6 +270,7 @@ TEST(LightFieldGlb, SmallFilesOfLargeMapsAreRefusedBeforeTheyAreUnpacked) {
                   p.binary.append(bytes, '\0');
                   return d["accessors"].size() - 1;
                 };
+                e.erase("reflection");
                 json& primitive = d["meshes"][0]["primitives"][0];
                 primitive["attributes"]["POSITION"] = add(60000, 5000, 5126, "VEC3");
                 primitive["attributes"]["TEXCOORD_0"] = add(40000, 5000, 5126, "VEC2");
@@ -264,7 +285,7 @@ TEST(LightFieldGlb, SmallFilesOfLargeMapsAreRefusedBeforeTheyAreUnpacked) {
                 const std::string large = encode_png(Image(3000, 2000, 3));
                 p.document["bufferViews"].push_back(
                     {{"buffer", 0}, {"byteOffset", p.binary.size()}, {"byteLength", large.size()}});
-                p.document["images"][1]["bufferView"] = p.document["bufferViews"].size() - 1;
+                p.document["images"][3]["bufferView"] = p.document["bufferViews"].size() - 1;
                 p.binary += large + std::string((4 - large.size() % 4) % 4, '\0');
               }),
               testing::HasSubstr("expected 20 x 12 pixels, found 3000 x 2000"));
@@ -312,6 +333,30 @@ TEST(LightFieldGlb, FieldsThatDoNotFitTogetherAreNotWritten) {
   EXPECT_THAT(e.message(), testing::HasSubstr("term 1"));
   EXPECT_EQ(test::expect_error([&] { slf::encode_light_field(made_up(false), {.map_quality = 101}); }).code(),
             ErrorCode::invalid_argument);
+}
+
+TEST(LightFieldGlb, WrongReflectionsAreNamed) {
+  const std::string good = slf::encode_light_field(made_up(false), {.texture_quality = 0, .map_quality = 0});
+  const auto expect_refused = [&](const std::string& place, const std::function<void(json&)>& spoil) {
+    Parts parts = parts_of(good);
+    spoil(extension_of(parts.document)["reflection"]);
+    const Error e = test::expect_error([&] { slf::decode_light_field(joined(parts), "bad.glb"); });
+    EXPECT_EQ(e.code(), ErrorCode::bad_input) << place;
+    EXPECT_THAT(std::string(e.what()), testing::HasSubstr("bad.glb")) << place;
+    EXPECT_THAT(std::string(e.what()), testing::HasSubstr(place));
+  };
+  expect_refused("reflection/normals", [](json& r) { r["normals"] = 0; });
+  expect_refused("bufferViews", [](json& r) { r["normals"] = 100000; });
+  expect_refused("square", [](json& r) { r["light"] = 0, r["grazing"] = 0; });
+  expect_refused("expected 5 x 5", [](json& r) { r["grazing"] = 0; });
+  expect_refused("\"light\"", [](json& r) { r.erase("light"); });
+  expect_refused("grazingScale/scale", [](json& r) { r["grazingScale"]["scale"] = 1e9; });
+
+  slf::LightField field = made_up(false);
+  field.reflection->normals[3] *= 2;
+  EXPECT_THAT(test::expect_error([&] { slf::encode_light_field(field); }).message(), testing::HasSubstr("unit length"));
+  field.reflection->normals.pop_back();
+  EXPECT_THAT(test::expect_error([&] { slf::encode_light_field(field); }).message(), testing::HasSubstr("each vertex"));
 }
 
 }  // namespace

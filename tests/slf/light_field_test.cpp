@@ -8,6 +8,7 @@
 #include <cmath>
 #include <memory>
 
+#include "sphere_grid.h"
 #include "support.h"
 #include "synthetic.h"
 
@@ -158,6 +159,76 @@ slf::PhotoSet exposed(slf::PhotoSet photos, const std::vector<Eigen::Vector3f>& 
   return photos;
 }
 
+TEST(LightField, MirrorsWhatAllPlacesMirrorAlike) {
+  // A highlight narrower than the photographs' spacing: between two of them it is where neither has it.
+  const hull::Mesh ball = test::sphere(24);
+  const auto training = photographs_of(ball, glossy(40), test::around(8, 3, 4, test::camera(160, 120, 200)));
+  std::vector<View> between;
+  for (int i = 0; i < 48; i += 5)
+    between.push_back(test::around(16, 3, 4, test::camera(160, 120, 200))[std::size_t(i)]);
+  const auto others = photographs_of(ball, glossy(40), between);
+  slf::LightFieldOptions options;
+  options.edge_alpha = test::kNoTrace;
+  options.terms = 2, options.iterations = 3, options.texel_px = 1;
+  Job job;
+  slf::LightFieldReport report;
+  const slf::LightField with = slf::fit_light_field(ball, training, options, job, &report);
+  options.reflections = false;
+  const slf::LightField without = slf::fit_light_field(ball, training, options, job);
+  ASSERT_TRUE(with.reflection);
+  EXPECT_FALSE(without.reflection);
+  EXPECT_GT(report.reflection_share, 0.7);
+  EXPECT_GT(mean_psnr(with, others), mean_psnr(without, others) + 2)
+      << mean_psnr(with, others) << " dB, without " << mean_psnr(without, others) << " dB";
+  // The brightest direction is the lamp's.
+  const slf::LightFieldReflection& r = *with.reflection;
+  const slf::SphereGrid grid(r.light.width());
+  const auto light = [&](const Eigen::Vector3f& d) {
+    const slf::SphereGrid::Place at = grid.at(d);
+    double sum = 0;
+    for (std::size_t k = 0; k < 4; ++k)
+      sum += double(at.weight[k]) * double(r.light.row<std::uint8_t>(0)[3 * at.node[k] + 1]);
+    return sum;
+  };
+  const Eigen::Vector3f lamp = Eigen::Vector3f(1, 0.5f, 0.8f).normalized();
+  const Eigen::Vector3f across = lamp.unitOrthogonal(), along = lamp.cross(across);
+  for (const Eigen::Vector3f& side : {across, along})
+    for (const float sign : {-1.0f, 1.0f}) EXPECT_GT(light(lamp), light((lamp + sign * 0.3f * side).normalized()) + 30);
+}
+
+TEST(LightField, LeavesOutReflectionsWhereThereAreNone) {
+  const hull::Mesh ball = test::sphere(16);
+  const auto photos = photographs_of(
+      ball, [bands = test::bands()](const Eigen::Vector3f& p, const Eigen::Vector3f&) { return bands(p); },
+      test::around(8, 2, 4, test::camera(120, 90, 150)));
+  slf::LightFieldOptions options;
+  options.edge_alpha = test::kNoTrace;
+  options.terms = 0;
+  Job job;
+  EXPECT_FALSE(slf::fit_light_field(ball, photos, options, job).reflection);
+}
+
+TEST(SphereGrid, HasNoSeam) {
+  const slf::SphereGrid grid(9);
+  // Values that vary over the sphere, one a direction.
+  std::vector<float> values(grid.size());
+  for (std::uint32_t i = 0; i < values.size(); ++i) values[i] = float((grid.alias(i) * 7919) % 101);
+  const auto at = [&](const Eigen::Vector3f& d) {
+    const slf::SphereGrid::Place p = grid.at(d);
+    float sum = 0, weight = 0;
+    for (std::size_t k = 0; k < 4; ++k) sum += p.weight[k] * values[p.node[k]], weight += p.weight[k];
+    EXPECT_NEAR(weight, 1, 1e-6);
+    return sum;
+  };
+  for (int i = 0; i < 2000; ++i) {
+    const float z = -1 + float(i) / 1000, a = float(i) * 2.4f, r = std::sqrt(std::max(0.0f, 1 - z * z));
+    const Eigen::Vector3f d(r * std::cos(a), r * std::sin(a), z);
+    EXPECT_NEAR(at(d), at((d + 1e-5f * Eigen::Vector3f(0.6f, -0.8f, 0.3f)).normalized()), 0.05f) << d.transpose();
+  }
+  // Across the border, where a quarter of the lower half ends and the next begins.
+  for (float t = 0; t < 1; t += 0.05f) EXPECT_NEAR(at({t, 1e-6f, t - 1}), at({t, -1e-6f, t - 1}), 0.01f) << t;
+}
+
 TEST(LightField, EvensOutExposureAndWhiteBalance) {
   const hull::Mesh mesh = test::sphere(40);
   const std::vector<View> views = test::around(10, 3, 4, test::camera(120, 100, 110));
@@ -214,7 +285,9 @@ TEST(LightField, RecoversFactorsOfKnownRankAndOrdersThemByEnergy) {
   const slf::PhotoSet fresh = photographs_of(mesh, rank_two(), new_views());
   Job job;
   const slf::LightField field = slf::fit_light_field(
-      mesh, seen, {.terms = 4, .surface_ridge = 1e-4, .view_smoothness = 1e-3, .edge_alpha = test::kNoTrace}, job);
+      mesh, seen,
+      {.terms = 4, .surface_ridge = 1e-4, .view_smoothness = 1e-3, .reflections = false, .edge_alpha = test::kNoTrace},
+      job);
   const double none = mean_psnr(field, fresh, 0), one = mean_psnr(field, fresh, 1), two = mean_psnr(field, fresh, 2),
                all = mean_psnr(field, fresh, 4);
   EXPECT_GT(one, none + 4);

@@ -448,7 +448,7 @@ TEST(TruthViews, ANewViewIsFoundInTheCapturesWorld) {
     EXPECT_NEAR(a.views->methods.at(method).psnr_inside, b.views->methods.at(method).psnr_inside, 0.3) << method;
   }
   EXPECT_THAT(a.left_out, testing::Contains(HasSubstr("light_field.glb")));
-  EXPECT_THAT(a.left_out, testing::Contains(HasSubstr("test_highlights.json")));
+  EXPECT_THAT(a.left_out, testing::Contains(HasSubstr("test_views/highlights/")));
   EXPECT_FALSE(fs::exists(plain.capture.folder() / "evaluate"));
 }
 

@@ -157,7 +157,7 @@ Vector3f LitScene::base_color(const Part& part, std::size_t material, const Hit&
   return part.material_of.empty() ? color : Vector3f(color.cwiseProduct(part.materials[material].colors[0]));
 }
 
-Vector3f LitScene::object_radiance(const Ray& ray, const Hit& hit) const {
+Vector3f LitScene::object_radiance(const Ray& ray, const Hit& hit, Shown shown) const {
   const auto& [ia, ib, ic] = mesh_.triangles[hit.triangle];
   const float b0 = 1 - hit.b1 - hit.b2;
   const Vector3f point = b0 * mesh_.vertices[ia] + hit.b1 * mesh_.vertices[ib] + hit.b2 * mesh_.vertices[ic];
@@ -173,11 +173,14 @@ Vector3f LitScene::object_radiance(const Ray& ray, const Hit& hit) const {
   const Part& part = parts_[object_of_[hit.triangle]];
   const std::size_t material = part.material_index(point, hit.triangle);
   const Material& m = part.materials[material];
-  if (m.unlit) return m.colors[0];
-  const float mirrored = mirror(m, cos_v);
-  Vector3f radiance = (1 - mirrored) * base_color(part, material, hit, point).cwiseProduct(light);
+  const bool alone = shown == Shown::highlights_alone;
+  if (m.unlit) return alone ? Vector3f(Vector3f::Zero()) : m.colors[0];
+  const float mirrored = alone ? 0 : mirror(m, cos_v);
+  Vector3f radiance = Vector3f::Zero();
+  if (!alone) radiance = (1 - mirrored) * base_color(part, material, hit, point).cwiseProduct(light);
   const Vector3f start = point + offset_ * normal;
   for (const Lamp& lamp : lamps_) {
+    if (shown == Shown::without_highlights) break;
     const Vector3f way = lamp.position - point;
     const float distance = way.norm();
     const Vector3f shine =

@@ -35,7 +35,7 @@ class LitScene {
   /// Index of the object that a triangle belongs to.
   std::uint32_t object_of(std::uint32_t triangle) const { return object_of_[triangle]; }
 
-  Eigen::Vector3f object_radiance(const hull::Ray& ray, const hull::Hit& hit) const;
+  Eigen::Vector3f object_radiance(const hull::Ray& ray, const hull::Hit& hit, Shown shown = Shown::all) const;
   Eigen::Vector3f room_radiance(const RoomHit& hit) const;
   /// Light at a place of the room; the ceiling has none.
   Eigen::Vector3f room_light(const RoomHit& hit) const;

@@ -190,9 +190,9 @@ class RowTracer {
     Vector3f middle = Vector3f::Zero(), from = Vector3f::Zero();
     for (std::size_t i = 0; i < rays.size(); ++i) {
       if (hits[i]) {
-        sum += scene_.object_radiance(rays[i], hits[i]);
+        sum += scene_.object_radiance(rays[i], hits[i], options_.shown);
         ++covered;
-      } else if (!unseen(rays[i])) {
+      } else if (!unseen(rays[i]) && options_.shown != Shown::highlights_alone) {
         ++room;
         if (smooth)
           middle += rays[i].direction, from += rays[i].origin;
@@ -288,9 +288,11 @@ Photo Photographer::photograph(const View& view, const PhotoOptions& options, st
     gaussian_blur(exposure.light, options.blur_px);
     gaussian_blur(exposure.cover, options.blur_px);
   }
-  add_sheets(scene, view, Shutter(view, options, during, center_depth), options.blur_px, exposure.cover, exposure.light,
-             job);
-  add_lines(scene, view, options.lines, options.blur_px, exposure.light);
+  if (options.shown != Shown::highlights_alone) {
+    add_sheets(scene, view, Shutter(view, options, during, center_depth), options.blur_px, exposure.cover,
+               exposure.light, job);
+    add_lines(scene, view, options.lines, options.blur_px, exposure.light);
+  }
   Photo photo;
   photo.picture = develop(exposure.light, options, mix(seed), job);
   photo.mask = converted(exposure.cover, PixelType::u8, 1);

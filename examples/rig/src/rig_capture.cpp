@@ -161,8 +161,10 @@ Taken take_all(const fs::path& folder, const RigOptions& o, Job& job) {
     take(photographer, s.camera, s.test_views, exact, "test views", truth / "test_views",
          truth / "test_views" / "masks", 0, job);
     write_camera_path(truth / "test_views.json", s.camera, s.test_views);
-    if (finder.any())
+    if (finder.any()) {
       write_highlights(truth / "test_highlights.json", finder, s.camera, s.test_views, o.photo.exposure, job);
+      photograph_highlights(truth / "test_views", photographer, s.camera, s.test_views, exact.photo, job);
+    }
   }
   return taken;
 }

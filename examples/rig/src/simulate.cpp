@@ -200,9 +200,11 @@ class Simulation {
     job_.end();
     write_camera_path(truth / "test_views.json", session_.lens.camera, shots);
     const HighlightFinder finder(session_.scene);
-    if (finder.any())
+    if (finder.any()) {
       write_highlights(truth / "test_highlights.json", finder, session_.lens.camera, shots,
                        session_.lens.photo.exposure, job_);
+      photograph_highlights(pictures, camera, session_.lens.camera, shots, exact, job_);
+    }
   }
 
   bool cable_in(const ExposureRecord& e) const {

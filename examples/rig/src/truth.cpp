@@ -85,6 +85,28 @@ void write_highlights(const std::filesystem::path& file, const HighlightFinder& 
   write(file, json);
 }
 
+void photograph_highlights(const std::filesystem::path& folder, const Photographer& photographer, const Camera& camera,
+                           const NamedShots& shots, const PhotoOptions& options, Job& job) {
+  namespace fs = std::filesystem;
+  constexpr std::pair<const char*, Shown> kParts[] = {{"without_highlights", Shown::without_highlights},
+                                                      {"highlights", Shown::highlights_alone}};
+  for (const auto& [name, shown] : kParts) fs::create_directories(folder / name);
+  job.begin("pictures of highlights", 2 * shots.names.size());
+  parallel_for(
+      job, 2 * shots.names.size(),
+      [&](std::size_t i) {
+        const auto& [name, shown] = kParts[i % 2];
+        const fs::path file = folder / name / (shots.names[i / 2] + ".png");
+        if (fs::exists(file)) return;
+        PhotoOptions part = options;
+        part.shown = shown;
+        Job alone({}, 1);
+        write_png(file, photographer.photograph({camera, shots.cam_from_world[i / 2]}, part, 0, alone).picture);
+      },
+      true);
+  job.end();
+}
+
 void write_camera_path(const std::filesystem::path& file, const Camera& camera, const NamedShots& shots) {
   Json json = document("lumihull-camera-path");
   json["views"] = Json::array();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <lumihull/rig/highlights.h>
+#include <lumihull/rig/photographer.h>
 #include <lumihull/rig/target_sheets.h>
 
 #include <filesystem>
@@ -27,6 +28,11 @@ void write_target_truth(const std::filesystem::path& file, const std::vector<Pla
 /// the photograph, 1 = white.
 void write_highlights(const std::filesystem::path& file, const HighlightFinder& finder, const Camera& camera,
                       const NamedShots& shots, double exposure, Job& job);
+
+/// What each shot shows without the lamps' gloss, and that gloss alone: without_highlights/NAME.png and
+/// highlights/NAME.png in `folder`. Files that are there stay.
+void photograph_highlights(const std::filesystem::path& folder, const Photographer& photographer, const Camera& camera,
+                           const NamedShots& shots, const PhotoOptions& options, Job& job);
 
 /// {"format": "lumihull-camera-path", "version": 1, "views": …}: the renderer's camera path.
 void write_camera_path(const std::filesystem::path& file, const Camera& camera, const NamedShots& shots);

@@ -80,10 +80,11 @@ void compare_views(const Capture& capture, const fs::path& folder, const truth::
       folder, models.methods(), background,
       [&](const Pose& cam_from_truth) { return truth_from_capture.in_capture(cam_from_truth); },
       options.pictures ? capture.folder() / "evaluate" / "test_views" : fs::path(), job);
+  std::error_code ignored;
   if (out.views->highlights.empty())
-    out.left_out.push_back(without("highlights", file_exists(folder / "test_highlights.json")
-                                                     ? "no two test views in a row have one"
-                                                     : "the truth has no test_highlights.json"));
+    out.left_out.push_back(without("highlights", fs::is_directory(folder / "test_views" / "highlights", ignored)
+                                                     ? "none is seen in two test views in a row"
+                                                     : "the truth has no test_views/highlights/"));
 }
 
 }  // namespace

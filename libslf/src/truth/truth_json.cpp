@@ -162,8 +162,8 @@ std::vector<std::string> TruthComparison::summary() const {
       out.push_back(line("new views, %s: PSNR %.2f dB, SSIM %.4f; inside %.2f dB, %.4f", method.c_str(), q.psnr, q.ssim,
                          q.psnr_inside, q.ssim_inside));
     for (const auto& [method, path] : views->highlights)
-      out.push_back(line("highlight, %s: in %zu of %zu views, along %.0f %% of its way, %.1f px off", method.c_str(),
-                         path.found, path.views, 100 * path.share, path.rms_px));
+      out.push_back(line("highlights, %s: %zu of %zu, along %.0f %% of their way, %.1f px off", method.c_str(),
+                         path.found, path.places, 100 * path.share, path.rms_px));
   }
   for (const std::string& what : left_out) out.push_back("left out: " + what);
   return out;

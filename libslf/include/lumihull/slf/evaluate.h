@@ -21,7 +21,8 @@ struct EvaluateOptions {
   std::filesystem::path model;            ///< textured mesh; empty: textured.glb in the capture
   std::filesystem::path light_field;      ///< empty: light_field.glb in the capture, where there is one
   /// Folder of views that are no photographs of the capture, as the virtual rig's truth/ has: test_views.json
-  /// (cameras), test_views/NAME.png, test_views/masks/NAME.png, and test_highlights.json where the object is glossy.
+  /// (cameras), test_views/NAME.png, test_views/masks/NAME.png; for highlights' ways test_views/without_highlights/NAME.png,
+  /// test_views/highlights/NAME.png and mesh.ply, in the views' world (see HighlightJudge).
   /// Empty: none.
   std::filesystem::path test_views;
   RenderOptions render{3, false};

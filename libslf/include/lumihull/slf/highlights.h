@@ -1,56 +1,62 @@
 #pragma once
 
 #include <lumihull/base/api.h>
+#include <lumihull/base/camera.h>
 #include <lumihull/base/image.h>
+#include <lumihull/hull/mesh.h>
 
-#include <Eigen/Core>
 #include <cstddef>
-#include <filesystem>
-#include <span>
+#include <map>
+#include <memory>
 #include <string>
-#include <vector>
 
 namespace lumihull::slf {
 
-/// A lamp's mirror image on an object, as it is known to be.
-struct Highlight {
-  int lamp = 0;
-  Eigen::Vector2d pixel{0, 0};  ///< (0.5, 0.5) = centre of the first pixel
-  double strength = 0;          ///< luminance that it adds there, 1 = white
-};
-
-/// The highlights of one view.
-struct ViewHighlights {
-  std::string name;
-  std::vector<Highlight> highlights;
-};
-
-/// Reads the truth that the virtual rig writes:
-///
-///     {"format": "lumihull-highlights", "version": 1,
-///      "shots": [{"name": "test_0001", "highlights": [{"lamp": 0, "point": [x, y, z], "pixel": [u, v], "strength":
-///      s}]}]}
-///
-/// Errors: not_found, bad_input naming file, JSON pointer and what was expected.
-LUMIHULL_API std::vector<ViewHighlights> read_highlights(const std::filesystem::path& file);
-
-/// How well pictures' highlight moves like the true one.
+/// How well pictures' highlights move like the true ones.
 struct HighlightPath {
-  int lamp = 0;
-  std::size_t views = 0;      ///< in which it truly is
-  std::size_t found = 0;      ///< in which the pictures show it, at least 30 % as strong as the photographs do
-  double true_length_px = 0;  ///< of its way from view to view
-  double share = 0;           ///< of that length which the pictures' highlight goes along with
-  double rms_px = 0;          ///< distance from its true place, over the views where it was found
+  std::size_t tracks = 0;  ///< highlights that were followed from view to view
+  std::size_t places = 0;  ///< of these, in all views
+  std::size_t found = 0;  ///< places where the pictures show a highlight, at least 30 % as strong as the photographs do
+  double true_length_px = 0;  ///< of the true ways over the surface
+  double share = 0;           ///< of that length which the pictures' highlights go along with, weighted by strength
+  double rms_px = 0;          ///< distance from the true place, over the places where one was found
 };
 
-/// Follows the highlight of the lamp that is strongest over all views. `pictures`, `photographs`: the same views in
-/// order, 8-bit RGB or RGBA; `matt`: the same without any gloss (the mean colour). What a picture has more in luma than
-/// `matt`, smoothed by 1 % of the picture's shorter side, is its gloss; the highlight is where that is largest within 8
-/// % of that side around the true place (its centroid above half the maximum). A step from one view to the next counts
-/// by its part along the true step, from 0 to the true step's length; steps from or to views without highlight count 0.
-/// Errors: invalid_argument (counts, sizes), degenerate (no two views in a row have the highlight).
-LUMIHULL_API HighlightPath follow_highlight(std::span<const Image> pictures, std::span<const Image> photographs,
-                                            std::span<const Image> matt, std::span<const ViewHighlights> truth);
+/// Judges how highlights move from view to view, each by itself. All pictures are 8-bit RGB or RGBA, sRGB; what a
+/// picture shows more than the object has without highlights, in linear luminance, is its gloss, smoothed by 0.4 % of
+/// the picture's shorter side. Spots are its local maxima of at least 2 % of white that stand out by a third of their
+/// height, and their place the centroid of what is above half of that.
+///
+/// True highlights are spots of the gloss as it truly is (as much of it as is below white) that the photographs show,
+/// too, at least half as strong. Those of two neighbouring views are one where each is the other's nearest on the
+/// surface, by less than two thirds of the distance of the next one; what cannot be told apart is not followed. A
+/// highlight's way is what it moves over the surface: the place in a later view less the place in that view of the
+/// surface's point where it was before. So what is painted on the surface goes no way at all. Steps are at least 1 % of
+/// the shorter side: a shorter one is joined with the next. A picture's highlight is the spot nearest to the true
+/// place, within 5 % of the shorter side; its step counts by its part along the true step, from 0 to the true step's
+/// length. Steps from or to where it is not found count 0, and so do those after which the picture shows a spot, at
+/// least half as bright, nearer to where it was: then that one stayed, and another was found. Each weighs as much as
+/// the true highlight is strong (the weaker of both ends).
+class LUMIHULL_API HighlightJudge {
+ public:
+  /// `surface`: the true one, in the views' world. Errors: bad_input (its indices).
+  explicit HighlightJudge(const hull::Mesh& surface);
+  HighlightJudge(HighlightJudge&&) noexcept;
+  ~HighlightJudge();
+
+  /// The next view: the object as it looks there without highlights, highlights alone, and the photograph. Errors:
+  /// invalid_argument (types, sizes).
+  void add_view(const View& view, const Image& without, const Image& alone, const Image& photograph);
+  /// What a method makes of the view that was added last; each method once a view. Errors: invalid_argument.
+  void add_picture(const std::string& method, const Image& picture);
+
+  /// Of each method that has pictures of all views, and of "photograph": the measure's own limit. Empty: no highlight
+  /// is seen in two views in a row.
+  std::map<std::string, HighlightPath> paths() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 }  // namespace lumihull::slf

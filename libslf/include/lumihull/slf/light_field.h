@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,15 @@ struct LightFieldTerm {
   ByteScale view_scale;
 };
 
+/// What all places of the surface mirror alike: linear light on top of their own colour, by the direction that a
+/// place's normal mirrors the eye's to.
+struct LightFieldReflection {
+  std::vector<Eigen::Vector3f> normals;  ///< of the vertices, unit length
+  Image light;    ///< square, 8-bit, 3 channels, 3 … 1024 px a side; directions as in SphereGrid
+  Image grazing;  ///< as large: what comes on top where a place is seen flatly, times (1 - n·d)³
+  ByteScale light_scale, grazing_scale;
+};
+
 /// A surface light field on a mesh, factored (Chen, Bouguet, Chu & Grzeszczuk 2002). A surface point p on a triangle
 /// with corners v_1 v_2 v_3, seen from the eye e, has the colour (sRGB values, 0 … 1)
 ///
@@ -43,7 +53,9 @@ struct LightFieldTerm {
 ///
 /// T the base's texture (left out where `adds_base` is false), Λ_j the barycentric coordinates. View maps are values at
 /// nodes, places that an eye may be at: h_k[v](e) = Σ_i w_i(v, e) h_k[v, i], with w the weights of `node_weights`.
-/// Terms are in the order of the energy that they contribute: the last ones may be left out.
+/// Terms are in the order of the energy that they contribute: the last ones may be left out. With a reflection E the
+/// above, to linear light, plus E(r, n·d), back to sRGB, is the colour; r = 2 (n·d) n - d, d the way to the eye, n the
+/// normal interpolated from the corners'.
 struct LightField {
   TexturedMesh base;
   bool adds_base = true;
@@ -51,6 +63,7 @@ struct LightField {
   Eigen::Vector3f up{0, 0, 1};         ///< the photographs' (see up_axis), unit length: turntables turn about it
   std::vector<std::uint8_t> slot;      ///< of each vertex, no two of a triangle alike; empty: common surface maps
   std::vector<LightFieldTerm> terms;
+  std::optional<LightFieldReflection> reflection;
 };
 
 inline constexpr int kMaxNodes = 255;
@@ -79,7 +92,8 @@ struct LightFieldOptions {
       0.05;  ///< joint: pulls surface maps towards 0 where photographs say little, in shares of their weight
   double view_smoothness = 0.02;  ///< pulls neighbouring nodes' values together, in shares of the photographs' weight
   double min_cosine = 0.15;       ///< flatter views count next to nothing, 0 … 1
-  bool even_exposure = false;     ///< evens out exposure and white balance between the photographs
+  bool reflections = true;     ///< joint: looks for what all places mirror alike, and keeps it where it explains much
+  bool even_exposure = false;  ///< evens out exposure and white balance between the photographs
   double visibility_offset =
       0.003;              ///< how far beside the surface a shadow starts to count, in diagonals of the mesh's box
   double erosion_px = 0;  ///< rim of the photographs' silhouettes that counts next to nothing, px
@@ -94,7 +108,9 @@ struct LightFieldReport {
   double unseen_share = 0;    ///< share of the surface texels that no photograph saw
   std::uint64_t samples = 0;  ///< texels x photographs that see them
   std::vector<Eigen::Vector3f>
-      gains;               ///< even_exposure: of each photograph, linear light, RGB; their geometric mean is 1
+      gains;  ///< even_exposure: of each photograph, linear light, RGB; their geometric mean is 1
+  double reflection_share =
+      0;                   ///< of the samples' variance about each texel's mean that mirroring explains; 0: not asked
   double rms = 0;          ///< of what is left of the samples' colours, sRGB values 0 … 1
   double rms_of_mean = 0;  ///< the same where only the mean colour is used
 };
@@ -137,6 +153,7 @@ class LUMIHULL_API LightFieldRenderer {
   std::vector<std::uint8_t> maps_;     // of each texel: texture, then slot by slot its terms' maps; 3 bytes each
   std::vector<ByteScale> map_scales_;  // of each term
   std::vector<float> view_;            // vertices x nodes x terms
+  std::vector<Eigen::Vector3f> normals_, mirrored_light_;  // of the vertices; of the sphere's nodes, linear. Or empty
 };
 
 }  // namespace lumihull::slf

@@ -148,7 +148,8 @@ struct TruthComparison {
 ///     cameras.json     "lumihull-rig-truth", or "lumihull-cameras" with one camera: intrinsics, poses
 ///     targets.json     "lumihull-rig-targets": where each target hangs
 ///     masks/NAME.png   silhouettes                    mesh.ply   the surface
-///     test_views.json, test_views/NAME.png, test_views/masks/NAME.png, test_highlights.json   new views
+///     test_views.json, test_views/NAME.png, test_views/masks/NAME.png   new views
+///     test_views/without_highlights/NAME.png, test_views/highlights/NAME.png   their highlights (HighlightJudge)
 ///
 /// What either side does not have is left out and named; without cameras.json only masks can be compared, for the two
 /// worlds are not known to be one. The world of the truth may differ from the capture's by a motion, and by a scale

@@ -30,6 +30,14 @@ struct ThinLine {
   Eigen::Vector3f color{.012f, .012f, .013f};  ///< radiance
 };
 
+/// What of the light a picture shows: a photograph is without_highlights + highlights_alone, as long as it is not
+/// white.
+enum class Shown : std::uint8_t {
+  all,
+  without_highlights,  ///< lamps light the scene, but objects don't mirror them; they mirror all the rest
+  highlights_alone,    ///< objects mirror the lamps, all else is black; no sheets and lines
+};
+
 /// What happens between the lens and the file.
 struct PhotoOptions {
   int rays = 2;        ///< rays x rays a pixel …
@@ -44,12 +52,13 @@ struct PhotoOptions {
   double read_noise = 9;                     ///< electrons
   bool bayer = false;                        ///< the sensor sees one colour a pixel (RGGB), demosaiced bilinearly
   bool depth = false;                        ///< fill Photo::depth
-  std::vector<ThinLine> lines;               ///< objects hide them; masks don't know of them
+  Shown shown = Shown::all;
+  std::vector<ThinLine> lines;  ///< objects hide them; masks don't know of them
   int reduce = 1;  ///< > 1: light is traced at 1/reduce of the size and enlarged bicubically; noise at full size
 };
 
-/// Time against quality, for those who want to say it in one word. fast: a third of the size is traced. normal: what the
-/// options' defaults are. fine: 4 times the rays and paths, finer light maps.
+/// Time against quality, for those who want to say it in one word. fast: a third of the size is traced. normal: what
+/// the options' defaults are. fine: 4 times the rays and paths, finer light maps.
 enum class Quality : std::uint8_t { fast, normal, fine };
 PhotoOptions photo_options(Quality quality);
 LightOptions light_options(Quality quality);
