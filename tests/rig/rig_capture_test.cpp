@@ -72,8 +72,9 @@ TEST(RigCapture, TheSameOptionsMakeTheSameBytes) {
     EXPECT_EQ(read_file(entry.path()), read_file(folder / "b" / name)) << name;
     ++compared;
   }
-  // Photographs, enclosure, masks; two cameras.json, mesh.ply, highlights.json; test views, masks, their two files.
-  EXPECT_EQ(compared, 4u + 2 + 4 + 4 + 2 + 2 + 2);
+  // Photographs, enclosure, masks; two cameras.json, mesh.ply, highlights.json; test views, masks, without highlights,
+  // highlights alone, their two files.
+  EXPECT_EQ(compared, 4u + 2 + 4 + 4 + 2 + 2 + 2 + 2 + 2);
 }
 
 TEST(RigCapture, PlainFilesListTheirMatrices) {
