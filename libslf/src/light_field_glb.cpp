@@ -19,7 +19,7 @@ using internal::Json;
 using internal::JsonReader;
 
 constexpr const char* kExtension = "LUMIHULL_surface_light_field";
-constexpr int kVersion = 1;
+constexpr int kVersion = 1, kVersionWithReflection = 2;  // which readers of the first would not notice
 constexpr int kUnsignedShort = 5123, kUnsignedInt = 5125;
 constexpr std::uint64_t kMostMapBytes = std::uint64_t(1) << 32;  // of all terms' maps, unpacked
 constexpr std::size_t kMostInflation = 1032;  // deflate's: a run of 258 bytes takes two bits (RFC 1951, 3.2.5)
@@ -86,9 +86,10 @@ LightField light_field_of(const GlbFile& file) {
     throw Error(ErrorCode::bad_input, std::string("the model has no light field: expected the extension ") + kExtension,
                 file.name());
   const JsonReader extension = primitive.at("extensions").at(kExtension);
-  if (const auto version = extension.at("version").integer(1, 1'000'000); version != kVersion)
+  if (const auto version = extension.at("version").integer(1, 1'000'000); version > kVersionWithReflection)
     throw Error(ErrorCode::unsupported,
-                "light field of version " + std::to_string(version) + ", expected " + std::to_string(kVersion),
+                "light field of version " + std::to_string(version) + ", expected at most " +
+                    std::to_string(kVersionWithReflection),
                 file.name());
 
   LightField field;
@@ -186,7 +187,7 @@ std::string encode_light_field(const LightField& field, const LightFieldFileOpti
   const std::vector<std::uint16_t> narrow_of(narrow ? vertex_of.begin() : vertex_of.end(), vertex_of.end());
   const std::size_t of_view = narrow ? buffer.add_view(narrow_of.data(), narrow_of.size() * 2)
                                      : buffer.add_view(vertex_of.data(), vertex_of.size() * 4);
-  Json extension = {{"version", kVersion},
+  Json extension = {{"version", field.reflection ? kVersionWithReflection : kVersion},
                     {"vertices", used.size()},
                     {"vertexOf", buffer.add_accessor({{"bufferView", of_view},
                                                       {"componentType", narrow ? kUnsignedShort : kUnsignedInt},

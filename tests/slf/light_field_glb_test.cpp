@@ -241,7 +241,7 @@ TEST(LightFieldGlb, WrongCountsAndSizesAreNamed) {
   in_extension("scale without end", [](json& e) { e["terms"][1]["surfaceScale"]["scale"] = 1e300; });
   expect_refused("no extension", [](json& d) { d["meshes"][0]["primitives"][0].erase("extensions"); });
   Parts newer = parts_of(good);
-  extension_of(newer.document)["version"] = 2;
+  extension_of(newer.document)["version"] = 3;
   write_file(folder / "newer.glb", joined(newer));
   EXPECT_EQ(test::expect_error([&] { slf::read_light_field(folder / "newer.glb"); }).code(), ErrorCode::unsupported);
 }
