@@ -17,6 +17,9 @@ constexpr float kUnknown = 3e-5f;                 // share that a colour has whi
 /// The same for the object where a pixel is not deep in the hull: mixtures of paper, ink and wall are seen nowhere
 /// else.
 constexpr float kUnknownAtRim = 0.3f * kUnknown;
+/// Any object may shine: a share that clipped white has on it at least.
+constexpr float kShine = 0.02f;
+constexpr int kClipped = 245;
 /// How much likelier object than background, by what the hull says: beside it, keyed as object; beside it, keyed as
 /// background; one, two, and more voxels deep.
 constexpr float kBeside = 0.5f, kAround = 1;
@@ -183,6 +186,7 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
               const std::uint32_t color = ColorCounts::bin(p);
               float odds =
                   object.share(color) + kAnywhere * all_object.share(color) + (deep > 1 ? kUnknown : kUnknownAtRim);
+              if (std::min({p[0], p[1], p[2]}) >= kClipped) odds += kShine;
               odds /= background.share(color) + kAnywhere * all_background.share(color) + kUnknown;
               odds *= deep ? kDeep[std::size_t(std::min(deep, 3) - 1)] : is ? kBeside : kAround;
               if (paper && paper->is_paper(p)) odds *= kPaperOdds;
