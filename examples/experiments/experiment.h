@@ -23,7 +23,7 @@ struct Size {
   /// Diameter of the targets' circles, px: in small pictures the sheets would not fit into the room otherwise.
   double circle_px() const { return full ? 9 : 6.5; }
   double density() const { return full ? 0.12 : 0.25; }  ///< share of walls and floor under sheets
-  int photos(int papers) const { return full ? papers : 24; }
+  int photos(int papers) const { return full ? papers : 48; }
   int visits() const { return full ? 25 : 5; }  ///< of each place, photographed (the robot's own: always 25)
   const char* name() const { return full ? "full" : "reduced"; }
 };

@@ -46,6 +46,8 @@ Json model_of(const fs::path& folder, const rig::SimulateOptions& options, const
   Capture capture = Capture::open(folder);
   if (!options.known_cameras)
     slf::set_option(capture, "calibrate", "targets", (fs::absolute(folder) / "sheets.json").string());
+  // So many photographs of the empty enclosure know its colours well, and gloss has colours just beside them.
+  slf::set_option(capture, "key", "foreground_share", 1.0);
   slf::set_option(capture, "hull", "resolution", std::int64_t(150));
   slf::set_option(capture, "evaluate", "truth", (fs::absolute(folder) / "truth").string());
   // Highlights have the colour of the sheets' paper, and what is keyed away there in one view would be cut away for

@@ -308,7 +308,7 @@ Json measure_large(const fs::path& folder, const Size& size, Job& job) {
   s.width = size.width();
   s.circle_px = 6;
   s.density = 0.2;
-  s.lens_photos = 0, s.empty_photos = 6, s.test_views = 4;
+  s.lens_photos = 0, s.empty_photos = 24, s.test_views = 4;
   s.photo.blur_px = 0.6;
   Json out = model_of(folder / "capture", s, size, job);
   out["size_m"] = kSize_m;
