@@ -33,17 +33,26 @@ enum Kind : std::uint8_t { kNeither, kObject, kBackground };
 /// How often colours occur among samples, each counted in its bin and, less, in those around it.
 class ColorCounts {
  public:
-  ColorCounts() : counts_(std::size_t(kBins) * kBins * kBins, 0) {}
+  ColorCounts() : samples_(std::size_t(kBins) * kBins * kBins, 0), counts_(samples_.size(), 0) {}
   static std::uint32_t bin(const std::uint8_t* rgb) {
     return std::uint32_t((rgb[0] >> kShift) * kBins + (rgb[1] >> kShift)) * kBins + std::uint32_t(rgb[2] >> kShift);
   }
-  void add(std::uint32_t at, float weight) {
-    if (touched_.empty() || touched_.back() != at) touched_.push_back(at);
-    total_ += weight;
-    spread(at, [&](float& count, float part) { count += weight * part; });
+  void add(std::uint32_t at) {
+    if (samples_[at]++ == 0) touched_.push_back(at);
+  }
+  /// After all were added. Many samples share few bins: each bin is spread once.
+  void smooth() {
+    for (const std::uint32_t at : touched_) {
+      const float weight = float(samples_[at]);
+      total_ += weight;
+      spread(at, [&](float& count, float part) { count += weight * part; });
+    }
   }
   void clear() {
-    for (const std::uint32_t at : touched_) spread(at, [](float& count, float) { count = 0; });
+    for (const std::uint32_t at : touched_) {
+      samples_[at] = 0;
+      spread(at, [](float& count, float) { count = 0; });
+    }
     touched_.clear();
     total_ = 0;
   }
@@ -60,8 +69,9 @@ class ColorCounts {
           visit(counts_[std::size_t((i * kBins + j) * kBins + k)],
                 (i == r ? 1 : 0.5f) * (j == g ? 1 : 0.5f) * (k == b ? 1 : 0.5f));
   }
+  std::vector<std::uint32_t> samples_;
   std::vector<float> counts_;
-  std::vector<std::uint32_t> touched_;
+  std::vector<std::uint32_t> touched_;  ///< bins that have samples
   float total_ = 0;
 };
 
@@ -151,9 +161,10 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
   const Samples samples = sample(mask, photo, view, depth, wide.silhouette(view, hull.margin_px(view)));
   ColorCounts all_object, all_background, object, background;
   for (std::size_t i = 0; i < samples.kinds.size(); ++i) {
-    if (samples.kinds[i] == kObject) all_object.add(samples.bins[i], 1);
-    if (samples.kinds[i] == kBackground) all_background.add(samples.bins[i], 1);
+    if (samples.kinds[i] == kObject) all_object.add(samples.bins[i]);
+    if (samples.kinds[i] == kBackground) all_background.add(samples.bins[i]);
   }
+  all_object.smooth(), all_background.smooth();
   std::vector<Open> open;
   std::size_t were_object = 0;
   for (int y0 = 0; y0 < height; y0 += kTile)
@@ -176,9 +187,10 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
                 for (int t = std::max(0, y0 - kTile); t < std::min(height, y1 + kTile); ++t)
                   for (int s = std::max(0, x0 - kTile); s < std::min(width, x1 + kTile); ++s) {
                     const std::size_t i = std::size_t(t) * std::size_t(width) + std::size_t(s);
-                    if (samples.kinds[i] == kObject) object.add(samples.bins[i], 1);
-                    if (samples.kinds[i] == kBackground) background.add(samples.bins[i], 1);
+                    if (samples.kinds[i] == kObject) object.add(samples.bins[i]);
+                    if (samples.kinds[i] == kBackground) background.add(samples.bins[i]);
                   }
+                object.smooth(), background.smooth();
               }
               const std::uint32_t color = ColorCounts::bin(p);
               float odds =
