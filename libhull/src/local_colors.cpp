@@ -36,17 +36,26 @@ enum Kind : std::uint8_t { kNeither, kObject, kBackground };
 /// How often colours occur among samples, each counted in its bin and, less, in those around it.
 class ColorCounts {
  public:
-  ColorCounts() : counts_(std::size_t(kBins) * kBins * kBins, 0) {}
+  ColorCounts() : samples_(std::size_t(kBins) * kBins * kBins, 0), counts_(samples_.size(), 0) {}
   static std::uint32_t bin(const std::uint8_t* rgb) {
     return std::uint32_t((rgb[0] >> kShift) * kBins + (rgb[1] >> kShift)) * kBins + std::uint32_t(rgb[2] >> kShift);
   }
-  void add(std::uint32_t at, float weight) {
-    if (touched_.empty() || touched_.back() != at) touched_.push_back(at);
-    total_ += weight;
-    spread(at, [&](float& count, float part) { count += weight * part; });
+  void add(std::uint32_t at) {
+    if (samples_[at]++ == 0) touched_.push_back(at);
+  }
+  /// After all were added. Many samples share few bins: each bin is spread once.
+  void smooth() {
+    for (const std::uint32_t at : touched_) {
+      const float weight = float(samples_[at]);
+      total_ += weight;
+      spread(at, [&](float& count, float part) { count += weight * part; });
+    }
   }
   void clear() {
-    for (const std::uint32_t at : touched_) spread(at, [](float& count, float) { count = 0; });
+    for (const std::uint32_t at : touched_) {
+      samples_[at] = 0;
+      spread(at, [](float& count, float) { count = 0; });
+    }
     touched_.clear();
     total_ = 0;
   }
@@ -63,8 +72,9 @@ class ColorCounts {
           visit(counts_[std::size_t((i * kBins + j) * kBins + k)],
                 (i == r ? 1 : 0.5f) * (j == g ? 1 : 0.5f) * (k == b ? 1 : 0.5f));
   }
+  std::vector<std::uint32_t> samples_;
   std::vector<float> counts_;
-  std::vector<std::uint32_t> touched_;
+  std::vector<std::uint32_t> touched_;  ///< bins that have samples
   float total_ = 0;
 };
 
@@ -101,8 +111,10 @@ struct Open {
 
 /// Neighbours of like colour come to agree. belief: -1 … 1.
 void agree(Image& mask, const Image& photo, std::span<const Open> open) {
+  if (open.empty()) return;
+  // By squared difference; the last is of neighbours that do not count.
   static const std::vector<float> alike = [] {
-    std::vector<float> table(kFarthest);
+    std::vector<float> table(kFarthest + 1, 0);
     for (int d = 0; d < kFarthest; ++d) table[std::size_t(d)] = kAgree * std::exp(-float(d) / (2 * kSigma * kSigma));
     return table;
   }();
@@ -111,30 +123,37 @@ void agree(Image& mask, const Image& photo, std::span<const Open> open) {
     x0 = std::min(x0, o.x - 1), x1 = std::max(x1, o.x + 2);
     y0 = std::min(y0, o.y - 1), y1 = std::max(y1, o.y + 2);
   }
-  x0 = std::max(x0, 0), y0 = std::max(y0, 0), x1 = std::min(x1, mask.width()), y1 = std::min(y1, mask.height());
-  if (x1 <= x0) return;
+  // All neighbours of what is open, those beyond the picture's border, too: they do not count.
   const std::size_t width = std::size_t(x1 - x0);
-  std::vector<float> belief(width * std::size_t(y1 - y0)), next(open.size());
-  const auto at = [&](int x, int y) -> float& { return belief[std::size_t(y - y0) * width + std::size_t(x - x0)]; };
-  for (int y = y0; y < y1; ++y)
-    for (int x = x0; x < x1; ++x) at(x, y) = mask.row<std::uint8_t>(y)[x] >= 128 ? 1.f : -1.f;
-  for (const Open& o : open) at(o.x, o.y) = std::tanh(o.odds / 2);
+  std::vector<float> belief(width * std::size_t(y1 - y0), 0), next(open.size());
+  const auto at = [&](int x, int y) { return std::size_t(y - y0) * width + std::size_t(x - x0); };
+  for (int y = std::max(y0, 0); y < std::min(y1, mask.height()); ++y)
+    for (int x = std::max(x0, 0); x < std::min(x1, mask.width()); ++x)
+      belief[at(x, y)] = mask.row<std::uint8_t>(y)[x] >= 128 ? 1.f : -1.f;
+  std::vector<std::array<std::uint16_t, 9>> apart(open.size());
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    const Open& o = open[i];
+    belief[at(o.x, o.y)] = std::tanh(o.odds / 2);
+    apart[i].fill(kFarthest);
+    const std::uint8_t* c = photo.row<std::uint8_t>(o.y) + 3 * o.x;
+    for (int v = std::max(0, o.y - 1); v < std::min(mask.height(), o.y + 2); ++v)
+      for (int u = std::max(0, o.x - 1); u < std::min(mask.width(), o.x + 2); ++u) {
+        if (u == o.x && v == o.y) continue;
+        const std::uint8_t* q = photo.row<std::uint8_t>(v) + 3 * u;
+        const int r = c[0] - q[0], g = c[1] - q[1], b = c[2] - q[2];
+        apart[i][std::size_t(3 * (v - o.y + 1) + u - o.x + 1)] =
+            std::uint16_t(std::min(r * r + g * g + b * b, kFarthest));
+      }
+  }
   for (int round = 0; round < kRounds; ++round) {
     for (std::size_t i = 0; i < open.size(); ++i) {
-      const Open& o = open[i];
-      const std::uint8_t* c = photo.row<std::uint8_t>(o.y) + 3 * o.x;
-      next[i] = o.odds;
-      for (int v = std::max(y0, o.y - 1); v < std::min(y1, o.y + 2); ++v)
-        for (int u = std::max(x0, o.x - 1); u < std::min(x1, o.x + 2); ++u) {
-          if (u == o.x && v == o.y) continue;
-          const std::uint8_t* q = photo.row<std::uint8_t>(v) + 3 * u;
-          const int r = c[0] - q[0], g = c[1] - q[1], b = c[2] - q[2], d = r * r + g * g + b * b;
-          if (d < kFarthest) next[i] += alike[std::size_t(d)] * at(u, v);
-        }
+      const float* corner = &belief[at(open[i].x - 1, open[i].y - 1)];
+      next[i] = open[i].odds;
+      for (std::size_t k = 0; k < 9; ++k) next[i] += alike[apart[i][k]] * corner[k / 3 * width + k % 3];
     }
-    for (std::size_t i = 0; i < open.size(); ++i) at(open[i].x, open[i].y) = std::tanh(next[i] / 2);
+    for (std::size_t i = 0; i < open.size(); ++i) belief[at(open[i].x, open[i].y)] = std::tanh(next[i] / 2);
   }
-  for (const Open& o : open) mask.row<std::uint8_t>(o.y)[o.x] = at(o.x, o.y) > 0 ? 255 : 0;
+  for (const Open& o : open) mask.row<std::uint8_t>(o.y)[o.x] = belief[at(o.x, o.y)] > 0 ? 255 : 0;
 }
 
 }  // namespace
@@ -154,9 +173,10 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
   const Samples samples = sample(mask, photo, view, depth, wide.silhouette(view, hull.margin_px(view)));
   ColorCounts all_object, all_background, object, background;
   for (std::size_t i = 0; i < samples.kinds.size(); ++i) {
-    if (samples.kinds[i] == kObject) all_object.add(samples.bins[i], 1);
-    if (samples.kinds[i] == kBackground) all_background.add(samples.bins[i], 1);
+    if (samples.kinds[i] == kObject) all_object.add(samples.bins[i]);
+    if (samples.kinds[i] == kBackground) all_background.add(samples.bins[i]);
   }
+  all_object.smooth(), all_background.smooth();
   std::vector<Open> open;
   std::size_t were_object = 0;
   for (int y0 = 0; y0 < height; y0 += kTile)
@@ -179,9 +199,10 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
                 for (int t = std::max(0, y0 - kTile); t < std::min(height, y1 + kTile); ++t)
                   for (int s = std::max(0, x0 - kTile); s < std::min(width, x1 + kTile); ++s) {
                     const std::size_t i = std::size_t(t) * std::size_t(width) + std::size_t(s);
-                    if (samples.kinds[i] == kObject) object.add(samples.bins[i], 1);
-                    if (samples.kinds[i] == kBackground) background.add(samples.bins[i], 1);
+                    if (samples.kinds[i] == kObject) object.add(samples.bins[i]);
+                    if (samples.kinds[i] == kBackground) background.add(samples.bins[i]);
                   }
+                object.smooth(), background.smooth();
               }
               const std::uint32_t color = ColorCounts::bin(p);
               float odds =

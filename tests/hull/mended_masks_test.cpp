@@ -22,7 +22,7 @@ constexpr double kRadius = 0.8, kBore = 0.17;
 /// one looks through. The room lights two spots of the ball: each is a hole in some masks, a notch in others.
 class Scene {
  public:
-  explicit Scene(const fs::path& folder, bool positioned = true) : capture(Capture::create(folder)) {
+  explicit Scene(const fs::path& folder, int positioned = kViews) : capture(Capture::create(folder)) {
     fs::create_directories(folder / "photos");
     fs::create_directories(folder / "enclosure");
     capture.cameras.push_back(view(0).camera);
@@ -35,7 +35,7 @@ class Scene {
       const auto& [photo, truth] = renders[std::size_t(i)];
       truths.push_back(truth);
       capture.shots.push_back(shot("photos/p" + std::to_string(i), photo));
-      if (positioned) capture.shots.back().cam_from_world = view(i).cam_from_world;
+      if (i < positioned) capture.shots.back().cam_from_world = view(i).cam_from_world;
     }
     for (int i = 0; i < 2; ++i)
       capture.enclosure.push_back(
@@ -176,12 +176,38 @@ TEST(MendedMasks, AreTheSameForAnyNumberOfThreads) {
   }
 }
 
-TEST(MendedMasks, NothingIsMendedWithoutCameras) {
+TEST(MendedMasks, FourCamerasAreAsNone) {
   test::TemporaryFolder folder;
-  Scene scene(folder / "c", false);
+  std::string alone;
+  for (const int cameras : {0, 4}) {
+    Scene scene(folder / std::to_string(cameras), cameras);
+    Job job;
+    EXPECT_EQ(key_capture(scene.capture, {}, job).mended, 0u);
+    if (cameras == 0) alone = scene.masks();
+    EXPECT_TRUE(scene.masks() == alone);
+    EXPECT_GT(scene.errors().missing, 0.02);
+  }
+}
+
+TEST(MendedMasks, ImportedAndEditedMasksAreNotTouched) {
+  test::TemporaryFolder folder;
+  Scene scene(folder / "c");
+  Image drawn(kWidth, kHeight, 1);  // the upper half of the ball, and a speck
+  for (int y = 0; y < kHeight / 2; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      drawn.row<std::uint8_t>(y)[x] = scene.truths[2].row<std::uint8_t>(y)[x] == 255 ? 255 : 0;
+  drawn.row<std::uint8_t>(600)[10] = 255;
+  scene.capture.write_mask(2, drawn, MaskSource::imported);
+  scene.capture.write_mask(7, scene.truths[7], MaskSource::keyed);
+  write_png(scene.capture.mask_path(scene.capture.shots[7]), drawn, {1});
+  const auto bytes = [&](std::size_t shot) { return read_file(scene.capture.mask_path(scene.capture.shots[shot])); };
+  const std::string imported = bytes(2), edited = bytes(7);
   Job job;
-  EXPECT_EQ(key_capture(scene.capture, {}, job).mended, 0u);
-  EXPECT_GT(scene.errors().missing, 0.02);
+  const KeyReport report = key_capture(scene.capture, {}, job);
+  EXPECT_EQ(report.kept, 2u);
+  EXPECT_GE(report.mended, 3u) << "others must be mended beside them";
+  EXPECT_TRUE(bytes(2) == imported);
+  EXPECT_TRUE(bytes(7) == edited);
 }
 
 }  // namespace
