@@ -17,7 +17,7 @@ if(NOT CMAKE_BUILD_TYPE)
 endif()
 
 find_program(LUMIHULL_CCACHE ccache)
-if(LUMIHULL_CCACHE AND PROJECT_IS_TOP_LEVEL)
+if(LUMIHULL_CCACHE AND PROJECT_IS_TOP_LEVEL AND NOT LUMIHULL_PRECOMPILED)  # it passes such files by
   set(CMAKE_C_COMPILER_LAUNCHER ${LUMIHULL_CCACHE})
   set(CMAKE_CXX_COMPILER_LAUNCHER ${LUMIHULL_CCACHE})
 endif()
@@ -33,6 +33,19 @@ find_package(nlohmann_json REQUIRED)
 find_package(embree 3 REQUIRED)
 
 include(GNUInstallDirs)
+
+# lumihull_precompile(TARGET): the target's files start from cmake/precompiled.h, which base parses for all of them.
+function(lumihull_precompile target)
+  if(NOT LUMIHULL_PRECOMPILED)
+    return()
+  endif()
+  set_target_properties(${target} PROPERTIES DEFINE_SYMBOL "")  # GCC takes what was parsed only under the same macros
+  if(target STREQUAL "lumihull_base")
+    target_precompile_headers(${target} PRIVATE ${PROJECT_SOURCE_DIR}/cmake/precompiled.h)
+  else()
+    target_precompile_headers(${target} REUSE_FROM lumihull_base)
+  endif()
+endfunction()
 
 add_library(lumihull_flags INTERFACE)
 target_compile_options(lumihull_flags INTERFACE
@@ -83,6 +96,7 @@ function(lumihull_library name folder)
   set_target_properties(lumihull_${name} PROPERTIES
     EXPORT_NAME ${name} VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}
     INSTALL_RPATH "$ORIGIN")
+  lumihull_precompile(lumihull_${name})
   install(TARGETS lumihull_${name} EXPORT lumihull-targets
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} FILE_SET HEADERS)
 endfunction()
