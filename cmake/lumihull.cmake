@@ -56,8 +56,11 @@ target_compile_options(lumihull_flags INTERFACE
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   # False alarms for std::string's operator+ (GCC bug 105329).
   target_compile_options(lumihull_flags INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wno-restrict>)
-  # At -O3, false alarms for Eigen's packets of four beside vectors of three, and for its small matrices; pages long.
-  target_compile_options(lumihull_flags INTERFACE $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-Wno-array-bounds$<SEMICOLON>-Wno-maybe-uninitialized>)
+  # At -O3, false alarms for Eigen's packets of four beside vectors of three, and for its small matrices; with precompiled
+  # headers for std::string, too; pages long.
+  foreach(alarm array-bounds maybe-uninitialized stringop-overflow stringop-overread)
+    target_compile_options(lumihull_flags INTERFACE $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-Wno-${alarm}>)
+  endforeach()
 endif()
 if(LUMIHULL_WERROR)
   target_compile_options(lumihull_flags INTERFACE -Werror)
