@@ -123,7 +123,8 @@ TEST(RigRobot, RemembersWhereItIs) {
   // Each visit is another pose; a move to where it is is none.
   EXPECT_GT((robot.cam_from_world_at_rest().center() - first.center()).norm(), 1e-4);
 
-  for (const char* text : {"", "rig-robot 1\nstop x\n", "rig-robot 1\nclock a b c d\nend\n", "something"}) {
+  for (const char* text : {"", "rig-robot 2\nstop x\n", "rig-robot 2\nclock a b c d\nend\n",
+                           "rig-robot 2\nreached 99999\nend\n", "something"}) {
     write_file(folder / "broken", text);
     EXPECT_EQ(test::expect_error([&] {
                 RigRobot(square(), {{}, folder / "broken", false});

@@ -66,6 +66,10 @@ RobotErrors RobotErrors::none() {
 
 RigRobot::RigRobot(const capture::Plan& plan, const Options& options)
     : kind_(plan.robot), mechanism_(plan.mechanism), options_(options), woke_(std::chrono::steady_clock::now()) {
+  for (const PlannedStop& stop : plan.stops) {
+    index_of_stop_.emplace(stop.name, int(travel_s_.size()));
+    travel_s_.push_back(stop.travel_s);
+  }
   const RobotErrors& e = options_.errors;
   for (const double x :
        {e.departure_m, e.attachment_m, e.offset_m, e.gain, e.winch_m, e.common_m, e.mount_m, e.mount_rad, e.bearing_rad,
@@ -133,10 +137,20 @@ void RigRobot::arrive(const PlannedStop& stop, double swing) {
   remember();
 }
 
+/// How long the way to a stop takes by the plan, with the ways to stops before it that were left out. What is no stop
+/// of the plan, or lies behind, is on a way that only a session takes that goes on.
+double RigRobot::travel_s(const PlannedStop& stop) {
+  const auto known = index_of_stop_.find(stop.name);
+  double seconds = 0;
+  if (known != index_of_stop_.end())
+    while (memory_.reached < known->second) seconds += travel_s_[std::size_t(++memory_.reached)];
+  return seconds;
+}
+
 void RigRobot::move_to(const PlannedStop& stop, Job& job) {
   job.check();
   tick();
-  memory_.clock_s += stop.travel_s;
+  memory_.clock_s += travel_s(stop);
   // A short way ends slowly: the swing is in proportion, up to that of 2 s of travel.
   arrive(stop, std::min(1., stop.travel_s / 2));
 }
@@ -144,6 +158,7 @@ void RigRobot::move_to(const PlannedStop& stop, Job& job) {
 void RigRobot::set_roll(double roll_rad, Job& job) {
   job.check();
   tick();
+  if (memory_.roll_rad == roll_rad && memory_.turned_at == memory_.stop) return;
   memory_.still_s = memory_.clock_s += 2;
   memory_.roll_rad = roll_rad;
   memory_.turned_at = memory_.stop;
@@ -169,7 +184,9 @@ void RigRobot::pass(double seconds) {
   remember();
 }
 
-void RigRobot::settle(double seconds) { pass(std::max(0., memory_.still_s + seconds - now_s())); }
+void RigRobot::pass_until(double time_s) { pass(std::max(0., time_s - now_s())); }
+
+void RigRobot::settle(double seconds) { pass_until(memory_.still_s + seconds); }
 
 /// Swing of a pendulum with several modes, each with its own period and phase; the tilt goes with the shift.
 Pose RigRobot::platform_at(double time_s) const {
@@ -232,17 +249,21 @@ void RigRobot::remember() const {
   const Memory& m = memory_;
   const Eigen::Quaterniond& q = m.commanded.rotation;
   const Vector3d& t = m.commanded.translation;
-  text << "rig-robot 1\n"
-       << "stop " << m.stop << "\nvisit " << m.visit << ' ' << m.place << "\nclock " << m.clock_s << ' ' << m.arrived_s
-       << ' ' << m.still_s << ' ' << m.swing << "\nroll " << m.roll_rad << ' ' << m.turned_at << "\npose " << q.w()
-       << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << "\nlengths";
+  text << "rig-robot 2\n"
+       << "stop " << m.stop << "\nreached " << m.reached << "\nvisit " << m.visit << ' ' << m.place << "\nclock "
+       << m.clock_s << ' ' << m.arrived_s << ' ' << m.still_s << ' ' << m.swing << "\nroll " << m.roll_rad << ' '
+       << m.turned_at << "\npose " << q.w() << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << t.x() << ' '
+       << t.y() << ' ' << t.z() << "\nlengths";
   for (const double length : m.lengths_m) text << ' ' << length;
   text << '\n';
   for (const auto& [place, n] : m.visits) text << "been " << n << ' ' << place << '\n';
   text << "end\n";
   // Not a result but a machine's state: it must not be torn, it need not survive a power cut.
   const std::filesystem::path aside = options_.memory.string() + ".new";
-  std::ofstream(aside) << text.str();
+  std::ofstream out(aside);
+  out << text.str();
+  out.close();
+  if (!out) throw Error(ErrorCode::io, "can't be written: is the disk full?", aside);
   std::filesystem::rename(aside, options_.memory);
 }
 
@@ -250,7 +271,7 @@ void RigRobot::recall() {
   if (options_.memory.empty() || !std::filesystem::exists(options_.memory)) return;
   std::istringstream in(read_file(options_.memory, std::size_t(64) << 20));
   std::string line, word;
-  if (!std::getline(in, line) || line != "rig-robot 1") broken(options_.memory);
+  if (!std::getline(in, line) || line != "rig-robot 2") broken(options_.memory);
   Memory m;
   bool whole = false;
   while (std::getline(in, line)) {
@@ -264,6 +285,8 @@ void RigRobot::recall() {
     };
     if (word == "stop") {
       m.stop = rest();
+    } else if (word == "reached") {
+      words >> m.reached;
     } else if (word == "visit") {
       words >> m.visit >> m.place;
     } else if (word == "clock") {
@@ -288,7 +311,8 @@ void RigRobot::recall() {
     }
     if (!words) broken(options_.memory);
   }
-  if (!whole || (mechanism_ && !m.lengths_m.empty() && m.lengths_m.size() != mechanism_->cables.size()))
+  if (!whole || m.reached < -1 || m.reached >= int(travel_s_.size()) ||
+      (mechanism_ && !m.lengths_m.empty() && m.lengths_m.size() != mechanism_->cables.size()))
     broken(options_.memory);
   memory_ = m;
   if (m.stop.empty()) return;
