@@ -103,11 +103,11 @@ class RigRobot : public capture::Robot {
     std::vector<double> lengths_m;
     double clock_s = 0, arrived_s = 0, still_s = 0, swing = 0;
     double roll_rad = 0;
-    std::string turned_at;    ///< where the bearing was last turned
-    std::uint64_t place = 0;  ///< what these lengths are known by; without a mechanism the stop's name
-    int visit = 0;            ///< of the place, from 1
-    int reached = -1;         ///< the last stop of the plan that it has come to
-    Pose commanded;           ///< of the platform; without a mechanism of the camera
+    std::string turned_at;          ///< where the bearing was last turned
+    std::uint64_t place = 0;        ///< what these lengths are known by; without a mechanism the stop's name
+    int visit = 0;                  ///< of the place, from 1
+    int reached = -1, turned = -1;  ///< the last stops of the plan whose way, and turn of the camera, took their time
+    Pose commanded;                 ///< of the platform; without a mechanism of the camera
     std::map<std::uint64_t, int> visits;
   };
   std::uint64_t place_of(const capture::PlannedStop& stop) const;
@@ -115,14 +115,15 @@ class RigRobot : public capture::Robot {
   Pose platform_at(double time_s) const;
   std::vector<CableLine> cables_to(const Pose& platform) const;
   Pose camera_on(const Pose& platform, double roll_rad, const std::string& turned_at) const;
-  double travel_s(const capture::PlannedStop& stop);
+  std::optional<int> index_of(const std::string& stop) const;
+  void travel(const capture::PlannedStop& stop);
   void arrive(const capture::PlannedStop& stop, double swing);
   void tick();
   void remember() const;
   void recall();
 
   std::string kind_;
-  std::vector<double> travel_s_;              ///< of the plan's stops
+  std::vector<double> travel_s_, turn_s_;     ///< of the plan's stops
   std::map<std::string, int> index_of_stop_;  ///< in the plan
   std::optional<capture::Mechanism> mechanism_, true_mechanism_;
   Pose mount_;  ///< true camera from where the plan has it
