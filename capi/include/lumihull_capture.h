@@ -426,7 +426,9 @@ LH_API lh_status lh_camera_device_create(lh_context *ctx, const lh_camera_functi
  * Robots: "simulate", which only takes its time; "turntable" and "hand", the session's operator is asked to do it;
  * "serial:PORT", the winches of the plan's mechanism. Cameras: "simulate", small pictures of a pattern; "hand";
  * "serial:PORT", or "serial" at the robot's own port; "gphoto2", "gphoto2:PORT"; "folder:DIR", where another program
- * leaves files. What is simulated remembers in FOLDER.simulated, beside the session's folder.
+ * leaves files. What is simulated remembers in FOLDER.simulated, beside the session's folder. The program's "rig", the
+ * virtual rig that photographs a scene, is not in the library: bring devices of your own by functions, above, or call
+ * the program.
  *
  * @return LH_EINVAL: no such word
  */

@@ -127,7 +127,9 @@ void add_capture(Program& program) {
   verb->add_option("--names", a->options.names, "names of photographs: {stop}, {camera}, {number} [{stop}-{camera}]");
   verb->add_option("--settle", a->settle, "seconds to wait at each stop, instead of the plan's")
       ->check(CLI::Range(0.0, 3600.0));
-  verb->add_option("--exposure", a->exposure, "seconds, instead of the plan's")->check(CLI::Range(0.0, 3600.0));
+  verb->add_option("--exposure", a->exposure, "seconds, above 0, instead of the plan's")
+      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(0.0, 3600.0));
   verb->add_option("--retries", a->options.retries, "of a shot that the camera refuses [2]")
       ->check(CLI::Range(0, 1000));
   verb->add_option("--least-free", a->least_free_mb, "stop where less is free on the disk, MB [200]")

@@ -98,7 +98,9 @@ void run(Program& program, const Arguments& a) {
   Capture capture = Capture::open(folder);
   slf::set_option(capture, "calibrate", "targets", fs::absolute(folder / "sheets.json").string());
   slf::set_option(capture, "hull", "resolution", std::int64_t(200));
-  slf::set_option(capture, "hull", "tolerance", std::int64_t(2));  // highlights as light as the sheets' paper make holes
+  // Highlights as light as the sheets' paper make holes, which a view may be wrong about where many see each place; with
+  // few photographs all that hardly any view sees would stay.
+  slf::set_option(capture, "hull", "tolerance", std::int64_t(a.photos < 40 ? 1 : 2));
   capture.set_hold_out(8);
   slf::run(capture, program.job(), false, [&](const slf::StageResult& result) {
     char text[64];

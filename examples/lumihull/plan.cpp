@@ -32,7 +32,7 @@ struct Arguments {
   std::string bearing = "gravity", cameras = "camera";
   ObjectSize object;
   Optics optics;
-  double radius = 0, margin = 0.05, spacing_deg = 0, overlap = 0, tilt_factor = 2.0 / 3, tilt_offset_deg = -30;
+  double radius = 0, margin = -1, spacing_deg = 0, overlap = 0, tilt_factor = 2.0 / 3, tilt_offset_deg = -30;
   double bearing_tolerance_deg = 8, settle = 7, exposure = 0.5, clearance = 0.05, travel = -1, square = 0;
   std::vector<double> center{0, 0, 0};
   Enclosure enclosure;
@@ -40,6 +40,13 @@ struct Arguments {
   std::uint64_t seed = 1;
   bool thin = false, raster = false;
 };
+
+/// What stays free of the picture on each side. Cables and hands come within some centimetres and degrees of where they
+/// are sent, a turntable is there.
+double margin_of(const Arguments& a) {
+  if (a.margin >= 0) return a.margin;
+  return a.robot == "turntable" ? .05 : .1;
+}
 
 /// Two numbers with a separator between them, as "24x10".
 std::pair<double, double> two_numbers(const std::string& text, const std::string& separator, const char* option) {
@@ -271,12 +278,13 @@ void run(Program& program, const Arguments& a) {
       pointing_error =
           std::max(pointing_error, std::abs(phi - (a.tilt_factor * phi + a.tilt_offset_deg) - 45) * kDegree);
   }
+  const double margin = margin_of(a);
   const double radius =
       a.radius > 0 ? a.radius
-                   : fill_radius(optics, a.object, orientation_of(a), a.margin, std::min(pointing_error, 60 * kDegree));
+                   : fill_radius(optics, a.object, orientation_of(a), margin, std::min(pointing_error, 60 * kDegree));
   if (!(a.radius > 0))
     program.say("radius    " + formatted("%.3f m: there the object fills the picture but for %.0f %% on each side",
-                                         radius, 100 * a.margin));
+                                         radius, 100 * margin));
   const HemisphereOptions views = views_of(a, radius);
   const Camera camera = a.camera.empty() ? ideal_camera(optics, radius) : calib::load_intrinsics(a.camera).camera;
   const Sharpness sharp = sharpness(optics, radius, a.exposure);
@@ -340,7 +348,9 @@ void add_plan(Program& program) {
   verb->add_option("--camera", a->camera, "the calibrated camera, for what is in the picture; else an ideal lens")
       ->type_name("FILE");
   verb->add_option("--radius", a->radius, "of the hemisphere, m; omitted: where the object fills the picture");
-  verb->add_option("--margin", a->margin, "of the picture that stays free on each side, without --radius [0.05]");
+  verb->add_option("--margin", a->margin,
+                   "of the picture that stays free on each side, without --radius [0.1; turntable 0.05]")
+      ->check(CLI::Range(0.0, 0.45));
   verb->add_option("--center", a->center, "of the hemisphere, world, m [0,0,0]")
       ->expected(3)
       ->delimiter(',')

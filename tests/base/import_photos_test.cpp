@@ -167,6 +167,9 @@ TEST_F(Masks, WrongOnesAreErrorsBeforeAnyIsWritten) {
   write_png(folder_ / "masks/a.png", half(20, 10, 1));
   write_png(folder_ / "masks/b.png", half(21, 10, 1));
   EXPECT_THAT(error().what(), testing::HasSubstr("21 x 10"));
+  EXPECT_THAT(error().what(), testing::Not(testing::HasSubstr("turned")));
+  write_png(folder_ / "masks/b.png", half(10, 20, 1));
+  EXPECT_THAT(error().what(), testing::HasSubstr("not turned as the camera was held"));
   EXPECT_EQ(capture_->mask_state(capture_->shots[0]), MaskSource::none);
   write_png(folder_ / "masks/b.png", test::pattern(20, 10, 3));
   EXPECT_THAT(error().what(), testing::HasSubstr("colour picture"));

@@ -223,6 +223,10 @@ static void wrong_use(lh_context *ctx, const lh_plan *plan, const char *folder) 
   EXPECT(ctx, LH_EINVAL, lh_camera_device_create(ctx, NULL, &camera));
   EXPECT(ctx, LH_EINVAL, lh_robot_by_word(ctx, "drone", &robot));
   EXPECT(ctx, LH_EINVAL, lh_camera_device_by_word(ctx, "eye", &camera));
+  EXPECT(ctx, LH_EINVAL, lh_robot_by_word(ctx, "rig", &robot));
+  CHECK_SAYS(ctx, "`lumihull capture --robot rig");
+  EXPECT(ctx, LH_EINVAL, lh_camera_device_by_word(ctx, "rig:bust:600", &camera));
+  CHECK_SAYS(ctx, "`lumihull capture --robot rig");
   EXPECT(ctx, LH_ENOTFOUND, lh_serial_link_open(ctx, "/nowhere/tty", 0, &link));
   EXPECT(ctx, LH_EINVAL, lh_robot_serial(ctx, NULL, NULL, &robot));
   EXPECT(ctx, LH_EINVAL, lh_camera_device_serial(ctx, NULL, &camera));

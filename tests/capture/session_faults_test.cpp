@@ -364,6 +364,21 @@ TEST(SessionFaults, AForeignCaptureIsLeftAlone) {
   EXPECT_THAT(test::expect_error([&] { scene.run(); }).message(), HasSubstr("not begun by"));
 }
 
+TEST(SessionFaults, AnExposureOfNoTimeIsRefusedBeforeAnythingMoves) {
+  const test::TemporaryFolder folder;
+  test::Scene scene(folder.path(), test::turntable_plan(3));
+  for (const double exposure_s : {0., -1., 3601.}) {
+    scene.options.exposure_s = exposure_s;
+    const Error error = test::expect_error([&] { scene.run(); });
+    EXPECT_EQ(error.code(), ErrorCode::bad_input);
+    EXPECT_THAT(error.message(), HasSubstr("exposure: expected above 0"));
+    EXPECT_TRUE(scene.exposures("main").empty());
+  }
+  scene.options.exposure_s = .002;
+  scene.run();
+  scene.expect_complete();
+}
+
 TEST(SessionFaults, CancelledWhileSettlingAndWhileExposing) {
   const test::TemporaryFolder folder;
   test::Scene scene(folder.path(), test::turntable_plan(4));

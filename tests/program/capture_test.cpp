@@ -105,6 +105,9 @@ TEST_F(CaptureVerb, WrongWordsAreErrors) {
   EXPECT_THAT(with("rig", "rig:dragon").err, HasSubstr("dragon"));
   EXPECT_THAT(with("rig", "rig:vase:3").err, HasSubstr("width"));
   EXPECT_THAT(with("simulate", "folder:" + mine("nowhere")).err, HasSubstr("nowhere"));
+  const auto no_time = capture({"--yes", "--exposure", "0"});
+  EXPECT_EQ(no_time.status, 2);
+  EXPECT_THAT(no_time.err, HasSubstr("--exposure"));
   const auto unplugged = with("serial:" + mine("tty"), "serial");
   EXPECT_EQ(unplugged.status, 1);
   EXPECT_THAT(unplugged.err, HasSubstr("tty"));

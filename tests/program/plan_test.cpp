@@ -26,8 +26,8 @@ class PlanVerb : public testing::Test {
 };
 
 TEST_F(PlanVerb, PlansTheCables) {
-  const auto run = plan({"--radius", "1.5", "--steps", "12x6", "--scatter", "200",
-                         "--json", "--svg", mine("pictures"), "--kicks", "20"});
+  const auto run = plan(
+      {"--radius", "1.5", "--steps", "12x6", "--scatter", "200", "--json", "--svg", mine("pictures"), "--kicks", "20"});
   ASSERT_EQ(run.status, 0) << run.err;
   const auto json = nlohmann::json::parse(run.out);
   const capture::Plan plan = capture::read_plan(mine("plan.json"));
@@ -53,6 +53,22 @@ TEST_F(PlanVerb, PlansATurntableAndAHand) {
     EXPECT_EQ(plan.robot, robot);
     EXPECT_FALSE(plan.mechanism);
   }
+}
+
+TEST_F(PlanVerb, LeavesMoreOfThePictureFreeForARobotThatErrs) {
+  const auto radius = [&](std::vector<std::string> words) {
+    words.insert(words.end(), {"--steps", "3x1", "--phi", "60..60", "--kicks", "1", "--json"});
+    const auto run = plan(words, "0.35");
+    EXPECT_EQ(run.status, 0) << run.err;
+    return run.status ? 0 : nlohmann::json::parse(run.out)["radius_m"].get<double>();
+  };
+  for (const std::string robot : {"cables", "hand", "turntable"}) {
+    const double chosen = radius({"--robot", robot});
+    EXPECT_EQ(chosen, radius({"--robot", robot, "--margin", robot == "turntable" ? "0.05" : "0.1"})) << robot;
+    EXPECT_NE(chosen, radius({"--robot", robot, "--margin", "0.08"})) << robot;
+  }
+  EXPECT_EQ(plan({"--margin", "0.5"}).status, 2);
+  EXPECT_EQ(plan({"--margin", "-0.1"}).status, 2);
 }
 
 TEST_F(PlanVerb, PlansVisitsForRepeatability) {

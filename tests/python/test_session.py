@@ -104,6 +104,11 @@ def test_wrong_words(plan: lumihull.Plan, tmp_path: Path) -> None:
         with pytest.raises(lumihull.Error) as caught:
             lumihull.Session(plan, tmp_path / "c", robot, cameras)
         assert caught.value.code == "invalid_argument"
+    for robot, cameras in (("rig", ["simulate"]), ("simulate", ["rig:bust"])):  # the program's alone
+        with pytest.raises(lumihull.Error, match="lumihull capture --robot rig"):
+            lumihull.Session(plan, tmp_path / "c", robot, cameras)
+    with pytest.raises(lumihull.Error, match="exposure: expected above 0"):
+        lumihull.Session(plan, tmp_path / "c", Robot(), [Camera()], exposure_s=0, agree_to_motion=True).run()
     with pytest.raises(lumihull.Error, match="no serial port"):
         lumihull.Session(plan, tmp_path / "c", "simulate", ["serial"]).dry_run()
     with pytest.raises(lumihull.Error, match="Is the way free"):  # nobody is there to agree

@@ -2,8 +2,10 @@
 #include <lumihull/base/image.h>
 #include <lumihull/rig/exif.h>
 
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 #include "support.h"
 
@@ -37,6 +39,32 @@ TEST(Exif, IsReadBack) {
   const Image a = decode_image(std::as_bytes(std::span(plain)), "a"), b = decode_image(bytes, "b");
   ASSERT_EQ(a.bytes(), b.bytes());
   EXPECT_TRUE(std::equal(a.data(), a.data() + a.bytes(), b.data()));
+}
+
+/// The side of the picture that is up, turned as the tag says, is the top.
+TEST(Exif, OrientationTurnsWhatIsUpToTheTop) {
+  const std::pair<Eigen::Vector3d, int> held[] = {{{.1, -.9, .3}, 1}, {{-.9, .1, .2}, 6},  {{.8, .3, -.5}, 8},
+                                                  {{-.2, .9, 0}, 3},  {{.2, -.1, .97}, 1}, {{0, 0, -1}, 1}};
+  for (const auto& [up, expected] : held) {
+    ASSERT_EQ(exif_orientation(up), expected) << up.transpose();
+    if (std::fabs(up.z()) > .9) continue;  // it looks up or down
+    Image picture(32, 16, 3);
+    for (int y = 0; y < 16; ++y)
+      for (int x = 0; x < 32; ++x)
+        for (int c = 0; c < 3; ++c)
+          picture.row<std::uint8_t>(y)[3 * x + c] = up.x() * (x - 15.5) + up.y() * (y - 7.5) > 0 ? 255 : 0;
+    ExifTags t = tags();
+    t.orientation = expected;
+    const std::string jpeg = with_exif(encode_jpeg(picture), t);
+    const auto bytes = std::as_bytes(std::span(jpeg));
+    EXPECT_EQ(decode_image_info(bytes, "test").orientation, expected);
+    const Image raw = decode_image(bytes, "raw"), upright = decode_image(bytes, "upright", {.apply_orientation = true});
+    EXPECT_EQ(raw.width(), 32) << "sensor's rows and columns unless asked";
+    ASSERT_EQ(upright.width(), expected >= 5 ? 16 : 32);
+    const int middle = upright.width() / 2;
+    EXPECT_GT(upright.row<std::uint8_t>(1)[3 * middle], 200) << expected;
+    EXPECT_LT(upright.row<std::uint8_t>(upright.height() - 2)[3 * middle], 50) << expected;
+  }
 }
 
 TEST(Exif, AnIndependentReaderFindsNoFault) {

@@ -1,7 +1,10 @@
 #include <lumihull/base/files.h>
+#include <lumihull/base/import.h>
+#include <lumihull/hull/auto_key.h>
 #include <lumihull/rig/rig_capture.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -77,6 +80,45 @@ TEST(RigCapture, TheSameOptionsMakeTheSameBytes) {
   EXPECT_EQ(compared, 4u + 2 + 4 + 4 + 2 + 2 + 2 + 2 + 2);
 }
 
+/// Masks are in the sensor's rows and columns, however the camera was held.
+TEST(RigCapture, OrientationTagsChangeNoMask) {
+  const test::TemporaryFolder folder;
+  Job job;
+  RigOptions o = small();
+  o.width = 240, o.empty_photos = 4;
+  make_capture(folder / "flat", o, job);
+  fs::copy(folder / "flat", folder / "held", fs::copy_options::recursive);
+  const std::string upright("\x12\x01\x03\x00\x01\x00\x00\x00\x01\x00", 10);  // the directory's entry
+  std::vector<fs::path> files, enclosure;
+  for (const char* from : {"photos", "enclosure"})
+    for (const auto& entry : fs::directory_iterator(folder / "held" / from)) {
+      std::string bytes = read_file(entry.path());
+      const std::size_t at = bytes.find(upright);
+      ASSERT_NE(at, std::string::npos);
+      bytes[at + 8] = files.size() % 2 ? 8 : 6;
+      write_file(entry.path(), bytes);
+      (from[0] == 'p' ? files : enclosure).push_back(entry.path());
+    }
+  std::sort(files.begin(), files.end());
+  const Capture imported = import_photos(files, {.output = folder / "imported"}, job);
+  Capture flat = Capture::open(folder / "flat"), held = Capture::open(folder / "held");
+  held.refresh_stamps(job);
+  hull::key_capture(flat, {}, job);
+  hull::key_capture(held, {}, job);
+  for (std::size_t i = 0; i < flat.shots.size(); ++i) {
+    const Image mask = flat.read_mask(i);
+    EXPECT_TRUE(test::same_bytes(mask, held.read_mask(i))) << i;
+    EXPECT_TRUE(test::same_bytes(flat.read_photo(i), imported.read_photo(i))) << i;
+    EXPECT_TRUE(imported.shots[i].orientation == 6 || imported.shots[i].orientation == 8);
+    EXPECT_EQ(imported.cameras[std::size_t(imported.shots[i].camera)].width, 240);
+    std::size_t object = 0;
+    for (int y = 0; y < mask.height(); ++y)
+      object += std::size_t(std::count_if(mask.row<std::uint8_t>(y), mask.row<std::uint8_t>(y) + mask.width(),
+                                          [](std::uint8_t m) { return m > 127; }));
+    EXPECT_GT(object, 1000u) << "nothing was keyed";
+  }
+}
+
 TEST(RigCapture, PlainFilesListTheirMatrices) {
   const test::TemporaryFolder folder;
   Job job;
@@ -120,6 +162,12 @@ TEST(RigCapture, OptionsAreChecked) {
     spoil(o);
     EXPECT_EQ(test::expect_error([&] { make_capture(folder / "x", o, job); }).code(), ErrorCode::invalid_argument);
   }
+  RigOptions crowded = small();
+  crowded.targets = true, crowded.target_px = 500;
+  const Error error = test::expect_error([&] { make_photographs(folder / "y", crowded, job); });
+  EXPECT_EQ(error.subject(), "sheets");
+  EXPECT_THAT(error.message(), testing::HasSubstr("smaller circles"));
+  EXPECT_FALSE(fs::exists(folder / "y")) << "what can't be is said before anything is made";
 }
 
 TEST(Trajectory, LooksAtItsTargetFromItsRadius) {

@@ -123,7 +123,8 @@ TEST(RigRobot, RemembersWhereItIs) {
   // Each visit is another pose; a move to where it is is none.
   EXPECT_GT((robot.cam_from_world_at_rest().center() - first.center()).norm(), 1e-4);
 
-  for (const char* text : {"", "rig-robot 1\nstop x\n", "rig-robot 1\nclock a b c d\nend\n", "something"}) {
+  for (const char* text : {"", "rig-robot 2\nstop x\n", "rig-robot 2\nclock a b c d\nend\n",
+                           "rig-robot 2\nreached 99999 0\nend\n", "something"}) {
     write_file(folder / "broken", text);
     EXPECT_EQ(test::expect_error([&] {
                 RigRobot(square(), {{}, folder / "broken", false});
@@ -131,6 +132,42 @@ TEST(RigRobot, RemembersWhereItIs) {
               ErrorCode::bad_input)
         << text;
   }
+}
+
+/// Whatever ways a session takes that goes on, the clock is the plan's.
+TEST(RigRobot, ItsClockGoesByThePlan) {
+  capture::Plan plan = square();
+  ASSERT_GE(plan.stops.size(), 6u);
+  for (std::size_t i = 3; i < plan.stops.size(); ++i) plan.stops[i].roll_rad += .5;  // turned at the fourth stop
+  Job job;
+  const auto visit = [&](RigRobot& robot, std::size_t i) {
+    robot.move_to(plan.stops[i], job);
+    robot.settle(7);
+  };
+  RigRobot whole(plan, {}), stopped(plan, {});
+  for (std::size_t i = 0; i < 6; ++i) {
+    whole.move_to(plan.stops[i], job);
+    if (i == 0 || i == 3) whole.set_roll(plan.stops[i].roll_rad, job);
+    if (i == 1 || i == 5) whole.settle(7);
+  }
+  stopped.move_to(plan.stops[0], job);
+  stopped.set_roll(plan.stops[0].roll_rad, job);
+  visit(stopped, 1);
+  stopped.pass(2);
+  const double at_second = stopped.now_s();
+  stopped.pass_until(at_second - 1);  // has passed
+  stopped.move_to(plan.stops[1], job);
+  capture::PlannedStop above = plan.stops[1];
+  above.name = "above", above.travel_s = 9;
+  for (double& length : above.lengths_m) length -= .2;
+  stopped.move_to(above, job);
+  stopped.move_to(plan.stops[0], job);
+  EXPECT_EQ(stopped.now_s(), at_second) << "ways back, and out, are none of the plan's";
+  stopped.move_to(plan.stops[4], job);  // past the place where the camera is turned, which is turned here
+  stopped.set_roll(plan.stops[4].roll_rad, job);
+  visit(stopped, 5);
+  EXPECT_DOUBLE_EQ(stopped.now_s(), whole.now_s() + 2);
+  EXPECT_GT(whole.now_s(), 7 + 7 + 2 + 2 + plan.stops[5].travel_s);
 }
 
 TEST(RigRobot, TablesAndHandsHaveSmallErrors) {

@@ -20,15 +20,16 @@ class ThinLines : public testing::Test {
     middle_ = scene_.center().cast<double>();
     view_.cam_from_world = look_at(middle_ + Eigen::Vector3d(1.2, 0, 0), middle_, {0, 0, 1});
   }
-  Covered draw(const Eigen::Vector3d& from_cam, const Eigen::Vector3d& to_cam, double radius, double blur = 0) const {
+  Covered draw(const Eigen::Vector3d& from_cam, const Eigen::Vector3d& to_cam, double radius, double blur = 0,
+               const PhotoOptions& lens = {}) const {
     const Pose world_from_cam = view_.cam_from_world.inverse();
-    return draw({world_from_cam * from_cam, world_from_cam * to_cam, float(radius), {0, 0, 0}}, blur);
+    return draw({world_from_cam * from_cam, world_from_cam * to_cam, float(radius), {0, 0, 0}}, blur, lens);
   }
-  Covered draw(const ThinLine& line, double blur = 0) const {
+  Covered draw(const ThinLine& line, double blur = 0, const PhotoOptions& lens = {}) const {
     Image light(view_.camera.width, view_.camera.height, 3, PixelType::f32);
     for (int y = 0; y < light.height(); ++y)
       for (int i = 0; i < 3 * light.width(); ++i) light.row<float>(y)[i] = 1;
-    add_lines(lit_, view_, {&line, 1}, blur, light);
+    add_lines(lit_, view_, {&line, 1}, Shutter(view_, lens, {}, 1.2), blur, light);
     Covered out{Image(light.width(), light.height(), 1, PixelType::f32), 0};
     for (int y = 0; y < light.height(); ++y)
       for (int x = 0; x < light.width(); ++x)
@@ -69,6 +70,39 @@ TEST_F(ThinLines, CoverWhatTheirOutlineDoes) {
   EXPECT_NEAR(deep.sum, f * (.14 / .5 - .30 / 1.3) * mean, 3e-3 * deep.sum);
   // Blur spreads, it does not add.
   EXPECT_NEAR(draw({-.1, -.14, .6}, {.12, -.12, .6}, .0008, 1.5).sum, flat.sum, 2e-3 * flat.sum);
+}
+
+TEST_F(ThinLines, AreOutOfFocusByTheirDepth) {
+  const double f = view_.camera.f, blur = .6;
+  PhotoOptions lens;
+  lens.f_number = 2, lens.focus_m = .9;
+  const double image_m = 1e-3 * f * lens.sensor_width_mm / view_.camera.width;
+  const double opening_m = 1 / (1 / image_m + 1 / lens.focus_m) / lens.f_number;
+  for (const double depth : {.3, .45, .9}) {
+    // Level, above the object: each column holds the same strip.
+    const double y = -.16 * depth, x = .3 * depth;
+    const auto spread = [&](const Covered& c) {
+      double sum = 0, first = 0, second = 0;
+      const int column = view_.camera.width / 2;
+      for (int row = 0; row < view_.camera.height; ++row) {
+        const double part = double(c.part.row<float>(row)[column]);
+        sum += part, first += part * row, second += part * row * row;
+      }
+      return std::pair(sum, second / sum - first * first / (sum * sum));
+    };
+    const auto [sharp_sum, sharp] = spread(draw({-x, y, depth}, {x, y, depth}, .001 * depth, 0));
+    const auto [sum, wide] = spread(draw({-x, y, depth}, {x, y, depth}, .001 * depth, blur, lens));
+    const double confusion = f * opening_m * std::fabs(1 / depth - 1 / lens.focus_m);  // its second moment: d² / 16
+    EXPECT_NEAR(wide - sharp, blur * blur + confusion * confusion / 16, .03 * (wide - sharp)) << depth;
+    EXPECT_NEAR(sum, sharp_sum, 2e-3 * sharp_sum) << depth;
+    if (depth < .5) {
+      EXPECT_GT(wide - sharp, 1.5 * blur * blur) << "nothing was out of focus";
+    }
+  }
+  // Out of one sharp plane into another's blur: spread, not added.
+  const Covered in = draw({0, -.14, .4}, {0, -.30, 1.3}, .001, blur),
+                out = draw({0, -.14, .4}, {0, -.30, 1.3}, .001, blur, lens);
+  EXPECT_NEAR(out.sum, in.sum, 5e-3 * in.sum);
 }
 
 TEST_F(ThinLines, FollowTheLens) {

@@ -76,6 +76,14 @@ class Directory {
 
 }  // namespace
 
+int exif_orientation(const Eigen::Vector3d& up) {
+  constexpr double kLeast = .3;  // sine of the angle between sight and plumb line below which nothing is told
+  const double across = up.x(), down = up.y();
+  if (std::hypot(across, down) < kLeast * up.norm()) return 1;
+  if (std::fabs(across) > std::fabs(down)) return across < 0 ? 6 : 8;
+  return down < 0 ? 1 : 3;
+}
+
 std::string with_exif(std::string_view jpeg, const ExifTags& tags) {
   if (!jpeg.starts_with("\xff\xd8\xff")) throw Error(ErrorCode::invalid_argument, "not a JPEG", "exif");
   Directory photo;
@@ -104,7 +112,7 @@ std::string with_exif(std::string_view jpeg, const ExifTags& tags) {
     Directory picture;
     picture.ascii(0x010f, tags.make);
     picture.ascii(0x0110, tags.model);
-    picture.number16(0x0112, 1);  // upright
+    picture.number16(0x0112, tags.orientation);
     picture.ascii(0x0132, tags.time);
     picture.number32(0x8769, photo_offset);
     photo_offset = std::uint32_t(8 + picture.size());

@@ -218,6 +218,7 @@ Vector3f LitScene::path_light(const Ray& first_ray, const Hit* first, std::uint6
 }
 
 void LitScene::light_objects(const LightOptions& options, Job& job) {
+  if (light_.empty()) return;
   std::vector<Vector3f> indirect(light_.size());
   job.begin("light on the objects", light_.size());
   parallel_chunks(

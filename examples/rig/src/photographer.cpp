@@ -289,9 +289,9 @@ Photo Photographer::photograph(const View& view, const PhotoOptions& options, st
     gaussian_blur(exposure.cover, options.blur_px);
   }
   if (options.shown != Shown::highlights_alone) {
-    add_sheets(scene, view, Shutter(view, options, during, center_depth), options.blur_px, exposure.cover,
-               exposure.light, job);
-    add_lines(scene, view, options.lines, options.blur_px, exposure.light);
+    const Shutter full(view, options, during, center_depth);
+    add_sheets(scene, view, full, options.blur_px, exposure.cover, exposure.light, job);
+    add_lines(scene, view, options.lines, full, options.blur_px, exposure.light);
   }
   Photo photo;
   photo.picture = develop(exposure.light, options, mix(seed), job);

@@ -28,6 +28,7 @@ using Json = nlohmann::json;
 using Pointer = Json::json_pointer;
 
 constexpr int kMostNodes = 100'000, kDeepest = 100;
+constexpr std::size_t kMostTriangles = 20'000'000;  ///< nodes may show the same mesh again and again
 
 enum : int { kU8 = 5121, kU16 = 5123, kU32 = 5125, kFloat = 5126, kTriangles = 4 };
 
@@ -88,7 +89,8 @@ class Reader {
   }
   std::size_t index(const Pointer& at) const {
     const Json& json = need(at, "an index");
-    if (!json.is_number_unsigned()) fail(at, "an index");
+    constexpr std::size_t kMost = std::size_t(1) << 40;  // beyond it sums could overflow
+    if (!json.is_number_unsigned() || json.get<std::size_t>() > kMost) fail(at, "an index");
     return json.get<std::size_t>();
   }
   std::size_t index(const Pointer& at, std::size_t otherwise) const { return find(at) ? index(at) : otherwise; }
@@ -190,6 +192,8 @@ class Reader {
     if (find(at / "indices")) indices = accessor(index(at / "indices"), "SCALAR", 1, {kU8, kU16, kU32});
     const std::size_t corners = indices ? indices->count : place.count;
     if (corners % 3 != 0) fail(at, "three corners a triangle");
+    if (object.mesh.triangles.size() + corners / 3 > kMostTriangles || object.mesh.vertices.size() > 3 * kMostTriangles)
+      fail(at, "a scene of at most 20 million triangles");
     for (std::size_t c = 0; c < corners; c += 3) {
       std::array<std::uint32_t, 3> t;
       std::array<Vector2f, 3> coordinates;

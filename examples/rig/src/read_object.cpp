@@ -32,7 +32,7 @@ Object read_object(const fs::path& file, const fs::path& texture, double size, b
     for (Eigen::Vector3f& v : object.mesh.vertices) v = Eigen::Vector3f(v.x(), -v.z(), v.y());
   const auto [low, high] = bounding_box(object.mesh);
   const float extent = (high - low).maxCoeff();
-  if (!(extent > 0) || !std::isfinite(extent))
+  if (!(extent > 0) || !std::isfinite(extent) || !std::isfinite(float(size) / extent))
     throw Error(ErrorCode::bad_input, "the mesh has no extent, or one that is not finite", file.string());
   const Eigen::Vector3f foot((low.x() + high.x()) / 2, (low.y() + high.y()) / 2, low.z());
   for (Eigen::Vector3f& v : object.mesh.vertices) v = (v - foot) * (float(size) / extent);

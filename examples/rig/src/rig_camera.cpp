@@ -80,8 +80,9 @@ std::string exif_time(double seconds) {
   return text;
 }
 
-std::string camera_file(const Image& picture, const RigLens& lens, double time_s, double exposure_s) {
+std::string camera_file(const Image& picture, const RigLens& lens, double time_s, double exposure_s, int orientation) {
   ExifTags tags;
+  tags.orientation = orientation;
   tags.time = exif_time(time_s);
   tags.focal_length_mm = lens.focal_mm;
   tags.sensor_width_mm = lens.sensor_width_mm;
@@ -123,7 +124,8 @@ std::string RigCamera::develop(const Exposure& e, Job& job) const {
   const Photo taken = photographer_().photograph(view, photo, seed, job, e.during);
   if (options_.masks) write_file(record(e.id, ".png"), encode_mask(taken.mask));
   if (options_.depth) write_file(record(e.id, ".depth"), raw_floats(taken.depth));
-  return camera_file(taken.picture, options_.lens, e.time_s, e.exposure_s);
+  return camera_file(taken.picture, options_.lens, e.time_s, e.exposure_s,
+                     exif_orientation(e.cam_from_world.rotation * Eigen::Vector3d::UnitZ()));
 }
 
 ShotOutcome RigCamera::shoot(ShotId id, double exposure_s, const fs::path& folder, Job& job) {
@@ -171,6 +173,7 @@ ShotOutcome RigCamera::shoot(ShotId id, double exposure_s, const fs::path& folde
 ShotOutcome RigCamera::recall(ShotId id) {
   const auto known = read_exposure(options_.truth, id);
   if (!known) return {ShotState::refused, {}, "not on the camera's list"};
+  robot_.pass_until(known->time_s + known->exposure_s + kBetweenShots_s);  // the robot may not have heard of it
   std::error_code error;
   if (!fs::exists(known->file, error) || sha256_of_file(known->file) != known->sha256) {
     Exposure e;

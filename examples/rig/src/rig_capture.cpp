@@ -12,6 +12,7 @@
 
 #include "noise.h"
 #include "repaint.h"
+#include "scattering.h"
 #include "truth.h"
 
 namespace lumihull::rig {
@@ -62,6 +63,7 @@ Session plan(const RigOptions& o) {
   if (o.targets) {
     session.targets = scatter_targets(session.scene, session.camera, around.radius,
                                       {.circle_px = o.target_px, .seed = mix(o.seed, 5)});
+    expect_hung(session.targets, o.target_px);
     session.scene.sheets = std::move(session.targets.prints);
   }
   if (o.path == Path::ring) around.phi_first = around.phi_last = 1.2;

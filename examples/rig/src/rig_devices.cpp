@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstdio>
 #include <utility>
 
 #include "session_truth.h"
@@ -107,11 +106,7 @@ void RigDevices::set_up(const std::string& what, Job& job) {
   what_ = what;
   session_ = plan_session(options_, {}, job);
   if (say_) {
-    char line[200];
-    std::snprintf(line, sizeof line, " from %.2f m, in a room of %.2f m; %zu sheets, at least %d of them in each view",
-                  session_->radius_m, double(session_->scene.enclosure.radius), session_->targets.placed.size(),
-                  session_->least_targets);
-    say_("virtual rig: " + options_.object + line);
+    say_("virtual rig: " + session_->said);
     for (const std::string& note : session_->notes) say_("note: " + note);
   }
   if (dry_) return;

@@ -45,6 +45,8 @@ Pose small_motion(const Vector3d& shift, const Vector3d& turn) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(angle, angle > 0 ? Vector3d(turn / angle) : Vector3d::UnitZ())), shift};
 }
 
+constexpr double kTurn_s = 2;  ///< of the camera in its bearing
+
 enum Thing : std::uint64_t { kDeparture = 1, kAttachment, kWinch, kMount, kArrival, kBearing, kSwing, kPlace };
 
 std::uint64_t thing(Thing kind, std::uint64_t which) { return mix(std::uint64_t(kind), which); }
@@ -66,6 +68,11 @@ RobotErrors RobotErrors::none() {
 
 RigRobot::RigRobot(const capture::Plan& plan, const Options& options)
     : kind_(plan.robot), mechanism_(plan.mechanism), options_(options), woke_(std::chrono::steady_clock::now()) {
+  for (std::size_t i = 0; i < plan.stops.size(); ++i) {
+    index_of_stop_.emplace(plan.stops[i].name, int(i));
+    travel_s_.push_back(plan.stops[i].travel_s);
+    turn_s_.push_back(i == 0 || plan.stops[i].roll_rad != plan.stops[i - 1].roll_rad ? kTurn_s : 0);
+  }
   const RobotErrors& e = options_.errors;
   for (const double x :
        {e.departure_m, e.attachment_m, e.offset_m, e.gain, e.winch_m, e.common_m, e.mount_m, e.mount_rad, e.bearing_rad,
@@ -133,10 +140,26 @@ void RigRobot::arrive(const PlannedStop& stop, double swing) {
   remember();
 }
 
+std::optional<int> RigRobot::index_of(const std::string& stop) const {
+  const auto known = index_of_stop_.find(stop);
+  return known == index_of_stop_.end() ? std::nullopt : std::optional(known->second);
+}
+
+/// Lets the time pass that the way to a stop takes by the plan, with ways and turns that were left out before it, in
+/// the plan's order, so that sums are the same to the last bit. What is no stop of the plan, or lies behind, is on a
+/// way that only a session takes that goes on.
+void RigRobot::travel(const PlannedStop& stop) {
+  Memory& m = memory_;
+  for (const int to = index_of(stop.name).value_or(-1); m.reached < to;) {
+    if (m.turned < m.reached) m.clock_s += turn_s_[std::size_t(m.turned = m.reached)];
+    m.clock_s += travel_s_[std::size_t(++m.reached)];
+  }
+}
+
 void RigRobot::move_to(const PlannedStop& stop, Job& job) {
   job.check();
   tick();
-  memory_.clock_s += stop.travel_s;
+  travel(stop);
   // A short way ends slowly: the swing is in proportion, up to that of 2 s of travel.
   arrive(stop, std::min(1., stop.travel_s / 2));
 }
@@ -144,7 +167,10 @@ void RigRobot::move_to(const PlannedStop& stop, Job& job) {
 void RigRobot::set_roll(double roll_rad, Job& job) {
   job.check();
   tick();
-  memory_.still_s = memory_.clock_s += 2;
+  if (const auto here = index_of(memory_.stop); here && *here > memory_.turned) {
+    memory_.turned = *here;
+    memory_.still_s = memory_.clock_s += turn_s_[std::size_t(*here)];
+  }
   memory_.roll_rad = roll_rad;
   memory_.turned_at = memory_.stop;
   remember();
@@ -169,7 +195,9 @@ void RigRobot::pass(double seconds) {
   remember();
 }
 
-void RigRobot::settle(double seconds) { pass(std::max(0., memory_.still_s + seconds - now_s())); }
+void RigRobot::pass_until(double time_s) { pass(std::max(0., time_s - now_s())); }
+
+void RigRobot::settle(double seconds) { pass_until(memory_.still_s + seconds); }
 
 /// Swing of a pendulum with several modes, each with its own period and phase; the tilt goes with the shift.
 Pose RigRobot::platform_at(double time_s) const {
@@ -232,17 +260,21 @@ void RigRobot::remember() const {
   const Memory& m = memory_;
   const Eigen::Quaterniond& q = m.commanded.rotation;
   const Vector3d& t = m.commanded.translation;
-  text << "rig-robot 1\n"
-       << "stop " << m.stop << "\nvisit " << m.visit << ' ' << m.place << "\nclock " << m.clock_s << ' ' << m.arrived_s
-       << ' ' << m.still_s << ' ' << m.swing << "\nroll " << m.roll_rad << ' ' << m.turned_at << "\npose " << q.w()
-       << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << "\nlengths";
+  text << "rig-robot 2\n"
+       << "stop " << m.stop << "\nreached " << m.reached << ' ' << m.turned << "\nvisit " << m.visit << ' ' << m.place
+       << "\nclock " << m.clock_s << ' ' << m.arrived_s << ' ' << m.still_s << ' ' << m.swing << "\nroll " << m.roll_rad
+       << ' ' << m.turned_at << "\npose " << q.w() << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << t.x()
+       << ' ' << t.y() << ' ' << t.z() << "\nlengths";
   for (const double length : m.lengths_m) text << ' ' << length;
   text << '\n';
   for (const auto& [place, n] : m.visits) text << "been " << n << ' ' << place << '\n';
   text << "end\n";
   // Not a result but a machine's state: it must not be torn, it need not survive a power cut.
   const std::filesystem::path aside = options_.memory.string() + ".new";
-  std::ofstream(aside) << text.str();
+  std::ofstream out(aside);
+  out << text.str();
+  out.close();
+  if (!out) throw Error(ErrorCode::io, "can't be written: is the disk full?", aside);
   std::filesystem::rename(aside, options_.memory);
 }
 
@@ -250,7 +282,7 @@ void RigRobot::recall() {
   if (options_.memory.empty() || !std::filesystem::exists(options_.memory)) return;
   std::istringstream in(read_file(options_.memory, std::size_t(64) << 20));
   std::string line, word;
-  if (!std::getline(in, line) || line != "rig-robot 1") broken(options_.memory);
+  if (!std::getline(in, line) || line != "rig-robot 2") broken(options_.memory);
   Memory m;
   bool whole = false;
   while (std::getline(in, line)) {
@@ -264,6 +296,8 @@ void RigRobot::recall() {
     };
     if (word == "stop") {
       m.stop = rest();
+    } else if (word == "reached") {
+      words >> m.reached >> m.turned;
     } else if (word == "visit") {
       words >> m.visit >> m.place;
     } else if (word == "clock") {
@@ -288,7 +322,8 @@ void RigRobot::recall() {
     }
     if (!words) broken(options_.memory);
   }
-  if (!whole || (mechanism_ && !m.lengths_m.empty() && m.lengths_m.size() != mechanism_->cables.size()))
+  if (!whole || std::min(m.reached, m.turned) < -1 || std::max(m.reached, m.turned) >= int(travel_s_.size()) ||
+      (mechanism_ && !m.lengths_m.empty() && m.lengths_m.size() != mechanism_->cables.size()))
     broken(options_.memory);
   memory_ = m;
   if (m.stop.empty()) return;

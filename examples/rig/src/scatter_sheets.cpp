@@ -173,6 +173,19 @@ std::optional<Pose> free_place(const RoomTargets& targets, const Scene& scene, i
   return pose;
 }
 
+void expect_hung(const RoomTargets& targets, double circle_px) {
+  if (!targets.placed.empty()) return;
+  double least_m = 1e300;
+  for (const calib::TargetDesign& design : targets.set.designs) least_m = std::min(least_m, sheet_width(design));
+  char text[300];
+  std::snprintf(
+      text, sizeof text,
+      "no sheet of targets hangs in the room: the smallest is %.2g m wide, so that circles of %g px are seen; "
+      "smaller circles (--target-px), wider photographs (--width) or a larger share of the walls are needed",
+      least_m, circle_px);
+  throw Error(ErrorCode::invalid_argument, text, "sheets");
+}
+
 RoomTargets scatter_targets(const Scene& scene, const Camera& camera, double distance,
                             const TargetSheetOptions& options) {
   if (!(options.circle_px >= 1 && options.circle_px <= 1000) || !(options.density > 0 && options.density <= .4) ||

@@ -19,4 +19,7 @@ void hang(RoomTargets& targets, int design, const Pose& world_from_target, const
 std::optional<Pose> free_place(const RoomTargets& targets, const Scene& scene, int design, const RoomHit& at,
                                double askew);
 
+/// Error{invalid_argument} where no sheet hangs in the room. circle_px: the wanted diameter of circles.
+void expect_hung(const RoomTargets& targets, double circle_px);
+
 }  // namespace lumihull::rig

@@ -7,9 +7,12 @@
 #include <algorithm>
 #include <climits>
 #include <cmath>
+#include <cstdio>
+#include <filesystem>
 
 #include "noise.h"
 #include "room.h"
+#include "scattering.h"
 #include "session_plan.h"
 
 namespace lumihull::rig {
@@ -37,6 +40,29 @@ double highest_seen(const std::vector<View>& views, double room_radius) {
         top = std::max(top, double(room.hit(view.center().cast<float>(), way).point.z()));
       }
   return top;
+}
+
+/// Whether a view cuts the objects off at its border, or has part of them behind it.
+bool cuts(const View& view, const Scene& scene) {
+  constexpr std::size_t kStep = 5;  // meshes are fine
+  for (const Object& object : scene.objects)
+    for (std::size_t i = 0; i < object.mesh.vertices.size(); i += kStep) {
+      const auto px = view.project(object.mesh.vertices[i].cast<double>());
+      if (!px || !view.camera.contains(*px)) return true;
+    }
+  return false;
+}
+
+std::string in_words(const SimulateOptions& o, const RigSession& s) {
+  const auto [low, high] = bounding_box(s.scene.objects.front().mesh);
+  const Eigen::Vector3f size = high - low;
+  char text[240];
+  std::snprintf(text, sizeof text, " of %.2f x %.2f x %.2f m, photographed from %.2f m in a room of %.2f m radius; ",
+                size.x(), size.y(), size.z(), s.radius_m, s.scene.enclosure.radius);
+  std::string said = std::filesystem::path(o.object).filename().string() + text;
+  if (s.targets.placed.empty()) return said + "no sheets of targets";
+  return said + std::to_string(s.targets.placed.size()) + " sheets of targets, each view decodes at least " +
+         std::to_string(s.least_targets);
 }
 
 }  // namespace
@@ -134,15 +160,19 @@ RigSession plan_session(const SimulateOptions& o, const std::optional<capture::P
     if (!Room(s.scene.enclosure).contains(view.center().cast<float>()))
       throw Error(ErrorCode::invalid_argument, "the camera would leave the room, or stand in the pedestal", "simulate");
 
+  std::size_t cut = 0;  // where the robot will be, the second of each pair of views
+  for (std::size_t i = 1; i < views.size(); i += 2) cut += cuts(views[i], s.scene);
+  if (cut > 0)
+    s.notes.push_back(std::to_string(cut) + " of " + std::to_string(views.size() / 2) +
+                      " photographs cut the object off at their border: a plan with a larger radius leaves more room");
+
   if (o.sheets) {
     const double circles = o.circle_px > 0 ? o.circle_px : 9;
     s.targets = scatter_targets(s.scene, s.lens.camera, s.radius_m,
                                 {.circle_px = circles, .density = o.density, .seed = mix(o.seed, 5)});
     const TargetSights sights(s.scene);
     const auto poor = add_sheets(s.targets, views, o.least_targets, sights, mix(o.seed, 7));
-    if (s.targets.placed.empty())
-      throw Error(ErrorCode::invalid_argument, "no sheet was hung: choose a larger density or smaller circles",
-                  "targets");
+    expect_hung(s.targets, circles);
     if (!poor.empty())
       s.notes.push_back(std::to_string(poor.size()) + " of " + std::to_string(views.size()) +
                         " views decode fewer than " + std::to_string(o.least_targets) +
@@ -152,6 +182,7 @@ RigSession plan_session(const SimulateOptions& o, const std::optional<capture::P
       s.least_targets = std::min(s.least_targets, int(sights.decodable(view, s.targets).size()));
     s.scene.sheets = s.targets.prints;
   }
+  s.said = in_words(o, s);
   return s;
 }
 

@@ -5,6 +5,7 @@
 #include <lumihull/base/files.h>
 #include <lumihull/base/parallel.h>
 #include <lumihull/capture/session.h>
+#include <lumihull/rig/exif.h>
 #include <lumihull/rig/simulate.h>
 #include <lumihull/rig/trajectory.h>
 
@@ -90,11 +91,7 @@ class Simulation {
     const bool exact =
         !session_.plan.mechanism && (options_.carrier == Carrier::ideal || options_.carrier == Carrier::automatic);
     out_.carrier = session_.plan.mechanism ? "cables" : exact ? "an ideal robot" : session_.plan.robot;
-    char text[200];
-    std::snprintf(text, sizeof text,
-                  "%s from %.2f m, in a room of %.2f m; %zu sheets, at least %d of them in each view",
-                  out_.carrier.c_str(), out_.radius_m, out_.room_radius_m, out_.sheets, out_.least_targets);
-    say(text);
+    say(session_.said + "; robot: " + out_.carrier);
     for (const std::string& note : session_.notes) say("note: " + note);
   }
 
@@ -158,7 +155,8 @@ class Simulation {
           Job alone({}, 1);  // one photograph a thread: encoding is serial
           const Photo photo = photographer.photograph({session_.lens.camera, poses[i]}, session_.lens.photo,
                                                       mix(mix(options_.seed, 4), i), alone);
-          write_file(file, camera_file(photo.picture, session_.lens, 12 * 3600 + 20 * double(i), .5));
+          const int held = exif_orientation(poses[i].rotation * Eigen::Vector3d::UnitZ());
+          write_file(file, camera_file(photo.picture, session_.lens, 12 * 3600 + 20 * double(i), .5, held));
         },
         true);
     job_.end();

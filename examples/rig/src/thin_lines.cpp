@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -18,7 +19,9 @@ using Eigen::Vector3f;
 namespace {
 
 constexpr double kPiece_px = 6, kNear_m = .02;
-constexpr int kSightRays = 4;  ///< a side of the pixel
+constexpr int kSightRays = 4;      ///< a side of the pixel
+constexpr double kFirst_px = .35;  ///< the first level of blur beyond the lens's own; each next has twice as much
+constexpr int kLevels = 12;
 
 using Polygon = std::vector<Vector2d>;
 
@@ -50,11 +53,8 @@ struct Slice {
 
 class Drawing {
  public:
-  Drawing(const LitScene& scene, const View& view)
-      : scene_(scene),
-        view_(view),
-        origin_(view.center()),
-        cover_(view.camera.width, view.camera.height, 1, PixelType::f32) {}
+  Drawing(const LitScene& scene, const View& view, const Shutter& shutter, double blur_px)
+      : scene_(scene), view_(view), shutter_(shutter), blur_px_(blur_px), origin_(view.center()) {}
 
   /// Whether any of it is in the picture.
   bool add(const ThinLine& line) {
@@ -87,12 +87,19 @@ class Drawing {
     return seen;
   }
 
-  void blur(double sigma_px) {
-    if (sigma_px > 0) gaussian_blur(cover_, sigma_px);
-  }
-  void paint(const Vector3f& color, Image& light) const {
+  void paint(const Vector3f& color, Image& light) {
+    Image sum;
+    for (auto& [level, cover] : covers_) {
+      if (const double sigma = sigma_px(level); sigma > 0) gaussian_blur(cover, sigma);
+      if (sum.empty()) {
+        sum = std::move(cover);
+        continue;
+      }
+      for (int y = 0; y < sum.height(); ++y)
+        for (int x = 0; x < sum.width(); ++x) sum.row<float>(y)[x] += cover.row<float>(y)[x];
+    }
     for (int y = 0; y < light.height(); ++y) {
-      const float* cover = cover_.row<float>(y);
+      const float* cover = sum.row<float>(y);
       float* pixel = light.row<float>(y);
       for (int x = 0; x < light.width(); ++x) {
         const float c = std::min(1.f, cover[x]);
@@ -103,6 +110,26 @@ class Drawing {
   }
 
  private:
+  /// Blurs come in levels; what lies between two is shared out so that its second moment is right.
+  double sigma_px(int level) const { return std::hypot(blur_px_, level > 0 ? kFirst_px * std::exp2(level - 1) : 0.); }
+  Image& cover(int level) {
+    Image& found = covers_[level];
+    if (found.empty()) found = Image(view_.camera.width, view_.camera.height, 1, PixelType::f32);
+    return found;
+  }
+  struct Shares {
+    Image *lower, *upper;
+    double of_upper;
+  };
+  Shares shares(double depth) {
+    const double wanted = std::hypot(blur_px_, shutter_.confusion_px(depth) / 4);
+    int level = 0;
+    while (level < kLevels && sigma_px(level + 1) <= wanted) ++level;
+    const double low = sigma_px(level) * sigma_px(level), high = sigma_px(level + 1) * sigma_px(level + 1);
+    const double share = std::clamp((wanted * wanted - low) / (high - low), 0., 1.);
+    return {&cover(level), share > 0 ? &cover(level + 1) : nullptr, share};
+  }
+
   /// The part before the camera and within the room, in the camera's frame.
   std::optional<std::pair<Vector3d, Vector3d>> clipped(const ThinLine& line) const {
     double low = 0, high = 1;
@@ -134,6 +161,7 @@ class Drawing {
               y1 = std::min(view_.camera.height - 1, int(std::floor(high.y())));
     if (!(high.x() > 0 && high.y() > 0 && low.x() < view_.camera.width && low.y() < view_.camera.height)) return false;
     const double depth = .5 * (a.depth + b.depth);
+    const Shares share = shares(depth);
     for (int y = y0; y <= y1; ++y) {
       polygon_.assign(corners.begin(), corners.end());
       cut(polygon_, 1, y, 1, other_);
@@ -143,8 +171,11 @@ class Drawing {
         cut(row_, 0, x, 1, other_);
         cut(other_, 0, x + 1, -1, polygon_);
         if (polygon_.size() < 3) continue;
-        const double part = area(polygon_);
-        if (part > 0) cover_.row<float>(y)[x] += float(part * visible(x, y, depth));
+        double part = area(polygon_);
+        if (part <= 0) continue;
+        part *= visible(x, y, depth);
+        share.lower->row<float>(y)[x] += float((1 - share.of_upper) * part);
+        if (share.upper) share.upper->row<float>(y)[x] += float(share.of_upper * part);
       }
     }
     return true;
@@ -171,8 +202,10 @@ class Drawing {
 
   const LitScene& scene_;
   const View& view_;
+  const Shutter& shutter_;
+  double blur_px_;
   Vector3d origin_;
-  Image cover_;
+  std::map<int, Image> covers_;  ///< by level
   Polygon polygon_, other_, row_;
   std::vector<hull::Ray> rays_;
   std::vector<hull::Hit> hits_;
@@ -180,12 +213,11 @@ class Drawing {
 
 }  // namespace
 
-void add_lines(const LitScene& scene, const View& view, std::span<const ThinLine> lines, double blur_px, Image& light) {
+void add_lines(const LitScene& scene, const View& view, std::span<const ThinLine> lines, const Shutter& shutter,
+               double blur_px, Image& light) {
   for (const ThinLine& line : lines) {
-    Drawing drawing(scene, view);
-    if (!drawing.add(line)) continue;
-    drawing.blur(blur_px);
-    drawing.paint(line.color, light);
+    Drawing drawing(scene, view, shutter, blur_px);
+    if (drawing.add(line)) drawing.paint(line.color, light);
   }
 }
 

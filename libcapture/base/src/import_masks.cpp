@@ -28,7 +28,10 @@ Image read_mask_file(const fs::path& file, const Camera& camera) {
   if (p.width() != camera.width || p.height() != camera.height)
     throw Error(ErrorCode::bad_input,
                 "the mask has " + std::to_string(p.width()) + " x " + std::to_string(p.height()) +
-                    " pixels, its photograph " + std::to_string(camera.width) + " x " + std::to_string(camera.height),
+                    " pixels, its photograph " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
+                    (p.width() == camera.height && p.height() == camera.width
+                         ? ": masks have the sensor's rows and columns, not turned as the camera was held"
+                         : ""),
                 file.string());
   if (p.channels() == 1) return p;
   Image mask = Image::uninitialized(p.width(), p.height(), 1);

@@ -43,7 +43,10 @@ bool is_camera(const Word& w) {
 }
 
 [[noreturn]] void unknown(const std::string& word, const std::string& expected) {
-  throw Error(ErrorCode::invalid_argument, "expected one of " + expected, word);
+  std::string what = "expected one of " + expected;
+  if (Word(word).what == "rig")
+    what += "; the virtual rig is a device of the program alone: `lumihull capture --robot rig --camera rig`";
+  throw Error(ErrorCode::invalid_argument, what, word);
 }
 
 }  // namespace

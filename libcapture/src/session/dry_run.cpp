@@ -55,9 +55,9 @@ class Checks {
 
   void check_options() {
     if (options_.retries < 0 || options_.retries > 1000) problem("retries: expected 0 to 1000");
-    for (const auto& [name, value] :
-         {std::pair("settle time", options_.settle_s), std::pair("exposure", options_.exposure_s)})
-      if (value && !(*value >= 0 && *value <= 3600)) problem(std::string(name) + ": expected 0 to 3600 s");
+    if (const auto s = options_.settle_s; s && !(*s >= 0 && *s <= 3600)) problem("settle time: expected 0 to 3600 s");
+    if (const auto s = options_.exposure_s; s && !(*s > 0 && *s <= 3600))
+      problem("exposure: expected above 0, at most 3600 s, as in a plan");
     if (!(options_.page_every_s >= 0) || !(options_.retry_after_s >= 0 && options_.retry_after_s <= 3600))
       problem("times between pages and retries: expected 0 s or more");
     for (const auto& [name, camera] : options_.intrinsics) {

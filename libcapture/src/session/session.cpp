@@ -312,8 +312,11 @@ class Session {
     try {
       return internal::way_out(plan_, from, plan_.stops[stop]);
     } catch (const Error& e) {
-      if (e.code() != ErrorCode::degenerate || (!at_ && high - low > 1)) throw;
-      who_.tell(std::string(e.what()) + "; it goes along the plan's own ways instead");
+      if (e.code() != ErrorCode::degenerate) throw;
+      if (!at_ && high - low > 1)
+        throw Error(e.code(), e.message() + ": drive the platform by hand to a stop nearer to it, and declare that one",
+                    e.subject());
+      who_.tell("to " + std::string(e.what()) + ": the robot goes along the plan's own ways instead");
     }
     // From between two neighbours: to that of the two which lies towards where it should go.
     const std::size_t begin = at_ ? *at_ : stop >= high ? high : low;

@@ -77,10 +77,7 @@ std::vector<PlannedStop> way_out(const Plan& plan, const Pose& from, const Plann
     auto obstacle = obstacle_between(plan, poses[i - 1], poses[i]);
     if (!obstacle && i + 1 < poses.size()) obstacle = obstacle_at(plan, poses[i]);
     if (obstacle)
-      throw Error(ErrorCode::degenerate,
-                  "no safe way straight up, over and down (" + *obstacle +
-                      "): drive the platform by hand to a stop nearer to it, and declare that one",
-                  to.name);
+      throw Error(ErrorCode::degenerate, "no safe way straight up, over and down (" + *obstacle + ")", to.name);
     way.push_back(i + 1 < poses.size() ? passing(plan, poses[i], to) : to);
   }
   return way;

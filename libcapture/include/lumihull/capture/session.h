@@ -24,7 +24,7 @@ struct SessionOptions {
   /// Names of photographs: {stop}, {camera} and {number} (of the stop in the plan, four digits). A retake's file is
   /// NAME~2, NAME~3, … Kept from the first session on.
   std::string names = "{stop}-{camera}";
-  std::optional<double> settle_s, exposure_s;    ///< instead of the plan's
+  std::optional<double> settle_s, exposure_s;    ///< instead of the plan's: 0 to 3600; above 0, at most 3600
   int retries = 2;                               ///< of a refused shot, in a session
   double retry_after_s = 1;                      ///< a camera may be busy
   std::string retake;                            ///< a stop's name: photograph it once more, and nothing else

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
 #include <string_view>
 
@@ -15,7 +16,12 @@ struct ExifTags {
   double exposure_s = 0.125;
   double f_number = 11;
   int iso = 100;
+  int orientation = 1;  ///< 1: upright; 3, 6, 8: as the camera was held
 };
+
+/// What a camera's sensor of gravity makes of how it is held: 1 (the picture's top is up), 6 (its left side is up), 8
+/// (its right side), 3; 1 where it looks so steeply up or down that no side is up. up: in the camera's frame.
+int exif_orientation(const Eigen::Vector3d& up);
 
 /// A JPEG with an Exif 2.3 APP1 segment behind its start marker. Error{invalid_argument} where `jpeg` is none.
 std::string with_exif(std::string_view jpeg, const ExifTags& tags);

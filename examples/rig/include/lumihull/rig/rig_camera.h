@@ -25,7 +25,8 @@ struct RigLens {
 /// Seconds since the rig's morning to an EXIF time.
 std::string exif_time(double seconds);
 /// A JPEG with EXIF as the camera writes it.
-std::string camera_file(const Image& picture, const RigLens& lens, double time_s, double exposure_s);
+std::string camera_file(const Image& picture, const RigLens& lens, double time_s, double exposure_s,
+                        int orientation = 1);
 
 /// A camera on a RigRobot: photographs what is before it where it really is, its swing during the exposure included.
 ///

@@ -46,8 +46,9 @@ struct RobotErrors {
 ///
 /// Time is the rig's own: it passes by moving and by `pass`, and is kept in a file with all else that the controller
 /// knows, so that a capture that was killed goes on with the same robot. What happens at a place depends on seed, place
-/// and how often the robot has come there, not on what happened before: a killed capture makes the same photographs. A
-/// move to where it is moves nothing.
+/// and how often the robot has come there, not on what happened before. A move to where it is moves nothing, and takes
+/// no time. Nor do ways that only a session takes which goes on after a stop (the plan's clock goes on where it was): a
+/// killed capture makes the same photographs, at the same times.
 class RigRobot : public capture::Robot {
  public:
   struct Options {
@@ -67,6 +68,8 @@ class RigRobot : public capture::Robot {
 
   /// Lets time pass: an exposure.
   void pass(double seconds);
+  /// Lets time pass until then; none where it has passed.
+  void pass_until(double time_s);
   /// Lets time pass until so many seconds after the last move or turn; none where they have passed.
   void settle(double seconds);
   double now_s() const;  ///< since the first session began
@@ -100,10 +103,11 @@ class RigRobot : public capture::Robot {
     std::vector<double> lengths_m;
     double clock_s = 0, arrived_s = 0, still_s = 0, swing = 0;
     double roll_rad = 0;
-    std::string turned_at;    ///< where the bearing was last turned
-    std::uint64_t place = 0;  ///< what these lengths are known by; without a mechanism the stop's name
-    int visit = 0;            ///< of the place, from 1
-    Pose commanded;           ///< of the platform; without a mechanism of the camera
+    std::string turned_at;          ///< where the bearing was last turned
+    std::uint64_t place = 0;        ///< what these lengths are known by; without a mechanism the stop's name
+    int visit = 0;                  ///< of the place, from 1
+    int reached = -1, turned = -1;  ///< the last stops of the plan whose way, and turn of the camera, took their time
+    Pose commanded;                 ///< of the platform; without a mechanism of the camera
     std::map<std::uint64_t, int> visits;
   };
   std::uint64_t place_of(const capture::PlannedStop& stop) const;
@@ -111,12 +115,16 @@ class RigRobot : public capture::Robot {
   Pose platform_at(double time_s) const;
   std::vector<CableLine> cables_to(const Pose& platform) const;
   Pose camera_on(const Pose& platform, double roll_rad, const std::string& turned_at) const;
+  std::optional<int> index_of(const std::string& stop) const;
+  void travel(const capture::PlannedStop& stop);
   void arrive(const capture::PlannedStop& stop, double swing);
   void tick();
   void remember() const;
   void recall();
 
   std::string kind_;
+  std::vector<double> travel_s_, turn_s_;     ///< of the plan's stops
+  std::map<std::string, int> index_of_stop_;  ///< in the plan
   std::optional<capture::Mechanism> mechanism_, true_mechanism_;
   Pose mount_;  ///< true camera from where the plan has it
   Options options_;

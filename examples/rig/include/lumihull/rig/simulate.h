@@ -99,6 +99,7 @@ struct RigSession {
   double radius_m = 0;
   Pose world_from_plan;  ///< the scene's floor is z = 0
   Scene scene;           ///< with the sheets
+  std::string said;      ///< object, distance, room and sheets in a line
   RoomTargets targets;
   RigLens lens;
   RobotErrors errors;
