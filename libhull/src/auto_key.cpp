@@ -108,7 +108,7 @@ std::optional<MaskRepair> look_around(const Capture& capture, std::span<const st
   if (std::filesystem::exists(calib::target_model_path(capture))) model = calib::TargetModel::of(capture);
   std::span<const calib::CalibratedBody> sheets;
   if (model) sheets = model->calibration.bodies;
-  auto repair = MaskRepair::learn({views, photos, given, sheets, key.background_median(), 0}, job);
+  auto repair = MaskRepair::learn({views, photos, given, sheets, &key, key.background_median(), 0}, job);
   job.end();
   return repair;
 }

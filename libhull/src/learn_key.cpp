@@ -204,7 +204,7 @@ LearnedKey learn_key(const Capture& capture, std::span<const std::size_t> shots,
     for (std::size_t i = 0; i < used; ++i)
       if (positioned[i]) pictures.push_back(std::move(photos[i]));
     const std::vector<std::uint8_t> fixed(list.size(), 0);
-    learned.repair = MaskRepair::learn({list, pictures, fixed, {}, {}, kSure}, job);
+    learned.repair = MaskRepair::learn({list, pictures, fixed, {}, nullptr, {}, kSure}, job);
   }
   return learned;
 }

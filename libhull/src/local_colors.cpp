@@ -24,14 +24,15 @@ constexpr int kClipped = 245;
 /// background; one, two, and more voxels deep.
 constexpr float kBeside = 0.5f, kAround = 1;
 constexpr std::array<float, 3> kDeep{2, 8, 32};
-constexpr float kPaperOdds = 4;      // and by a colour that only sheets have
-constexpr double kLeastSure = 5e-5;  // of the picture: so many pixels so deep make a mask doubtful
+constexpr float kShadowOdds = 0.03f;  // what is surely shadow
+constexpr float kPaperOdds = 4;       // and by a colour that only sheets have
+constexpr double kLeastSure = 5e-5;   // of the picture: so many pixels so deep make a mask doubtful
 constexpr int kRounds = 6;
 constexpr float kAgree = 3;      // log odds that a neighbour of the same colour is worth
 constexpr float kSigma = 12;     // levels by which neighbours' colours may differ
 constexpr int kFarthest = 2048;  // squared difference of colours beyond which neighbours do not count
 
-enum Kind : std::uint8_t { kNeither, kObject, kBackground };
+enum Kind : std::uint8_t { kNeither, kObject, kWall, kOnSheet };
 
 /// How often colours occur among samples, each counted in its bin and, less, in those around it.
 class ColorCounts {
@@ -60,6 +61,11 @@ class ColorCounts {
     total_ = 0;
   }
   float share(std::uint32_t at) const { return total_ > 0 ? counts_[at] / total_ : 0; }
+  /// Of both together.
+  float share(std::uint32_t at, const ColorCounts& other) const {
+    const float total = total_ + other.total_;
+    return total > 0 ? (counts_[at] + other.counts_[at]) / total : 0;
+  }
 
  private:
   /// Binomial weights 1 2 1 along each axis, 1 in the middle.
@@ -84,7 +90,8 @@ struct Samples {
   std::vector<std::uint32_t> bins;
 };
 
-Samples sample(const Image& mask, const Image& photo, const CoarseView& view, const Image& depth, const Image& near) {
+Samples sample(const Image& mask, const Image& photo, const CoarseView& view, const Image& depth, const Image& near,
+               const Image* parts) {
   const int width = depth.width(), height = depth.height(), pixels = mask.width() / width;
   const auto object = [&](int x, int y) {
     return mask.row<std::uint8_t>(y * pixels + pixels / 2)[x * pixels + pixels / 2] >= 128;
@@ -96,7 +103,7 @@ Samples sample(const Image& mask, const Image& photo, const CoarseView& view, co
       const std::size_t i = std::size_t(y) * std::size_t(width) + std::size_t(x);
       out.bins[i] = ColorCounts::bin(photo.row<std::uint8_t>(y * pixels + pixels / 2) + 3 * (x * pixels + pixels / 2));
       if (!near.row<std::uint8_t>(y)[x])
-        out.kinds[i] = kBackground;
+        out.kinds[i] = parts && parts->row<std::uint8_t>(y)[x] != kNoSheet ? kOnSheet : kWall;
       else if (depth.row<std::uint8_t>(y)[x] && object(x, y) && object(x - 1, y) && object(x + 1, y) &&
                object(x, y - 1) && object(x, y + 1))
         out.kinds[i] = kObject;
@@ -159,7 +166,7 @@ void agree(Image& mask, const Image& photo, std::span<const Open> open) {
 }  // namespace
 
 std::size_t decide_by_surroundings(Image& mask, const Image& photo, const CoarseView& view, const CoarseHull& hull,
-                                   const CoarseHull& wide, const PaperColors* paper, int least) {
+                                   const CoarseHull& wide, const Clues& clues, int least) {
   const Image depth = hull.depth(view, 1), around = wide.depth(view, 1);
   const int width = depth.width(), height = depth.height(), pixels = mask.width() / width;
   if (least > 0) {
@@ -170,13 +177,15 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
                 mask.row<std::uint8_t>(y * pixels + pixels / 2)[x * pixels + pixels / 2] < 128;
     if (double(sure) < std::max(4.0, kLeastSure * width * height)) return 0;
   }
-  const Samples samples = sample(mask, photo, view, depth, wide.silhouette(view, hull.margin_px(view)));
-  ColorCounts all_object, all_background, object, background;
+  const Samples samples =
+      sample(mask, photo, view, depth, wide.silhouette(view, hull.margin_px(view)), clues.sheet_parts);
+  ColorCounts all_object, all_wall, all_sheet, object, wall, sheet;
   for (std::size_t i = 0; i < samples.kinds.size(); ++i) {
     if (samples.kinds[i] == kObject) all_object.add(samples.bins[i]);
-    if (samples.kinds[i] == kBackground) all_background.add(samples.bins[i]);
+    if (samples.kinds[i] == kWall) all_wall.add(samples.bins[i]);
+    if (samples.kinds[i] == kOnSheet) all_sheet.add(samples.bins[i]);
   }
-  all_object.smooth(), all_background.smooth();
+  all_object.smooth(), all_wall.smooth(), all_sheet.smooth();
   std::vector<Open> open;
   std::size_t were_object = 0;
   for (int y0 = 0; y0 < height; y0 += kTile)
@@ -187,6 +196,7 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
         for (int x = x0; x < x1; ++x) {
           const int deep = depth.row<std::uint8_t>(y)[x];
           const bool may_be = deep || around.row<std::uint8_t>(y)[x];
+          const bool no_sheet = clues.sheet_parts && clues.sheet_parts->row<std::uint8_t>(y)[x] == kNoSheet;
           for (int v = y * pixels; v < (y + 1) * pixels; ++v) {
             const std::uint8_t* row = mask.row<std::uint8_t>(v);
             const std::uint8_t* p = photo.row<std::uint8_t>(v) + 3 * x * pixels;
@@ -195,22 +205,25 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
               if (is ? deep > 0 || least > 0 : !may_be || (least > 0 && deep == 0)) continue;
               if (!learned) {
                 learned = true;
-                object.clear(), background.clear();
+                object.clear(), wall.clear(), sheet.clear();
                 for (int t = std::max(0, y0 - kTile); t < std::min(height, y1 + kTile); ++t)
                   for (int s = std::max(0, x0 - kTile); s < std::min(width, x1 + kTile); ++s) {
                     const std::size_t i = std::size_t(t) * std::size_t(width) + std::size_t(s);
                     if (samples.kinds[i] == kObject) object.add(samples.bins[i]);
-                    if (samples.kinds[i] == kBackground) background.add(samples.bins[i]);
+                    if (samples.kinds[i] == kWall) wall.add(samples.bins[i]);
+                    if (samples.kinds[i] == kOnSheet) sheet.add(samples.bins[i]);
                   }
-                object.smooth(), background.smooth();
+                object.smooth(), wall.smooth(), sheet.smooth();
               }
               const std::uint32_t color = ColorCounts::bin(p);
               float odds =
                   object.share(color) + kAnywhere * all_object.share(color) + (deep > 1 ? kUnknown : kUnknownAtRim);
               if (std::min({p[0], p[1], p[2]}) >= kClipped) odds += kShine;
-              odds /= background.share(color) + kAnywhere * all_background.share(color) + kUnknown;
+              odds /= kUnknown + (no_sheet ? wall.share(color) + kAnywhere * all_wall.share(color)
+                                           : wall.share(color, sheet) + kAnywhere * all_wall.share(color, all_sheet));
               odds *= deep ? kDeep[std::size_t(std::min(deep, 3) - 1)] : is ? kBeside : kAround;
-              if (paper && paper->is_paper(p)) odds *= kPaperOdds;
+              if (clues.paper && clues.paper->is_paper(p)) odds *= kPaperOdds;
+              if (clues.shadows && clues.shadows->is_sure(p)) odds *= kShadowOdds;
               open.push_back({u, v, std::log(odds)});
               were_object += is;
             }

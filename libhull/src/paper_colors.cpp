@@ -2,20 +2,12 @@
 
 #include <lumihull/base/parallel.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <map>
 #include <utility>
 
 namespace lumihull::hull {
 namespace {
 
-constexpr double kPrint = 0.98;  // of a target's half side: what is printed for certain
-constexpr double kMargin = 2.2;  // half sides from a target's middle within which there may be paper
-constexpr std::uint8_t kMaybe = 1, kSheet = 2;
 constexpr int kDark = 48;          // red + green + blue below which a colour has no hue to speak of
 constexpr double kMoreOften = 2;   // paper's colours are so much commoner on sheets than beside them
 constexpr double kLeastCount = 2;  // pixels that must have a colour, for its hue not to be asked instead
@@ -73,97 +65,19 @@ class Palette {
   double total_ = 0;
 };
 
-/// A target's plane, as far as its points reach.
-struct Sheet {
-  Eigen::Vector3d center, normal, along, across;  ///< `along` and `across` lead to the middles of its sides
-};
-
-/// Sets the pixels of a convex polygon to at least `value`.
-void fill(Image& image, std::span<const Eigen::Vector2d> polygon, std::uint8_t value) {
-  double top = INFINITY, bottom = -INFINITY;
-  for (const auto& p : polygon) top = std::min(top, p.y()), bottom = std::max(bottom, p.y());
-  const int y1 = int(std::min(double(image.height()), std::ceil(bottom)));
-  for (int y = int(std::max(0.0, std::floor(top))); y < y1; ++y) {
-    double left = INFINITY, right = -INFINITY;
-    for (std::size_t k = 0; k < polygon.size(); ++k) {
-      const Eigen::Vector2d &a = polygon[k], &b = polygon[(k + 1) % polygon.size()];
-      if ((a.y() < y + 0.5) == (b.y() < y + 0.5)) continue;
-      const double x = a.x() + (y + 0.5 - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
-      left = std::min(left, x), right = std::max(right, x);
-    }
-    std::uint8_t* row = image.row<std::uint8_t>(y);
-    for (int x = int(std::max(0.0, std::floor(left))); x < std::min(double(image.width()), right); ++x)
-      row[x] = std::max(row[x], value);
-  }
-}
-
-/// Where a view shows what is printed for certain, and where there may be paper; 0 elsewhere.
-Image sheets_of(const CoarseView& v, std::span<const Sheet> sheets) {
-  Image out(v.mask.width(), v.mask.height(), 1);
-  for (const Sheet& s : sheets) {
-    if (s.normal.dot(v.view.center() - s.center) <= 0) continue;
-    for (const auto& [reach, value] : {std::pair(kMargin, kMaybe), std::pair(kPrint, kSheet)}) {
-      std::vector<Eigen::Vector2d> outline;
-      constexpr int kSteps = 4;  // along a side: lenses bend it
-      for (int k = 0; k < 4 * kSteps; ++k) {
-        const double t = 2.0 * (k % kSteps) / kSteps - 1;
-        const double x = k / kSteps == 0 ? t : k / kSteps == 1 ? 1 : k / kSteps == 2 ? -t : -1;
-        const double y = k / kSteps == 0 ? -1 : k / kSteps == 1 ? t : k / kSteps == 2 ? 1 : -t;
-        const auto px = v.view.project(s.center + reach * (x * s.along + y * s.across));
-        if (px) outline.push_back(*px / v.step);
-      }
-      if (outline.size() == 4 * kSteps) fill(out, outline, value);
-    }
-  }
-  return out;
-}
-
-std::vector<Sheet> sheets_of(std::span<const calib::CalibratedBody> bodies, const Eigen::Vector3d& eyes) {
-  std::vector<Sheet> sheets;
-  for (const calib::CalibratedBody& body : bodies) {
-    if (!body.placed) continue;
-    std::map<std::pair<int, int>, std::vector<std::size_t>> targets;
-    for (std::size_t k = 0; k < std::min(body.features.size(), body.points.size()); ++k)
-      targets[{body.features[k].design, body.features[k].id}].push_back(k);
-    for (const auto& [name, points] : targets) {
-      if (points.size() < 4) continue;
-      // Sides lie as printed: along the target's own axes.
-      Sheet s;
-      const Eigen::Quaterniond& turn = body.body.world_from_body.rotation;
-      s.center = Eigen::Vector3d::Zero();
-      for (const std::size_t k : points) s.center += body.points[k] / double(points.size());
-      const Eigen::Vector3d x = turn * Eigen::Vector3d::UnitX(), y = turn * Eigen::Vector3d::UnitY();
-      double wide = 0, high = 0;
-      for (const std::size_t k : points) {
-        wide = std::max(wide, std::abs(x.dot(body.points[k] - s.center)));
-        high = std::max(high, std::abs(y.dot(body.points[k] - s.center)));
-      }
-      s.along = wide * x, s.across = high * y;
-      s.normal = x.cross(y);
-      if (s.normal.dot(eyes - s.center) < 0) s.normal = -s.normal;
-      sheets.push_back(s);
-    }
-  }
-  return sheets;
-}
-
 }  // namespace
 
-std::optional<PaperColors> PaperColors::learn(std::span<const calib::CalibratedBody> bodies,
-                                              std::span<const CoarseView> views, std::span<const Image> photos,
-                                              const CoarseHull& hull, Job& job) {
-  Eigen::Vector3d eyes = Eigen::Vector3d::Zero();
-  for (const CoarseView& v : views) eyes += v.view.center() / double(views.size());
-  const std::vector<Sheet> sheets = sheets_of(bodies, eyes);
+std::optional<PaperColors> PaperColors::learn(std::span<const Sheet> sheets, std::span<const CoarseView> views,
+                                              std::span<const Image> photos, const CoarseHull& hull, Job& job) {
   std::vector<Palette> on(views.size()), beside(views.size());
   parallel_for(job, views.size(), [&](std::size_t i) {
     const CoarseView& v = views[i];
-    const Image near = hull.silhouette(v, hull.margin_px(v)), kinds = sheets_of(v, sheets);
+    const Image near = hull.silhouette(v, hull.margin_px(v)), parts = sheets_in(v, sheets);
     for (int y = v.frame.y0; y < v.frame.y1; ++y) {
-      const std::uint8_t *is_near = near.row<std::uint8_t>(y), *kind = kinds.row<std::uint8_t>(y);
+      const std::uint8_t *is_near = near.row<std::uint8_t>(y), *part = parts.row<std::uint8_t>(y);
       const std::uint8_t* p = photos[i].row<std::uint8_t>(y) + 3 * v.frame.x0;
       for (int x = v.frame.x0; x < v.frame.x1; ++x, p += 3)
-        if (!is_near[x] && kind[x] != kMaybe) (kind[x] ? on : beside)[i].add(p);
+        if (!is_near[x] && part[x] != kPaperRim) (part[x] == kPrint ? on : beside)[i].add(p);
     }
   });
   Palette sheet, rest;

@@ -2,7 +2,6 @@
 
 #include <lumihull/base/image.h>
 #include <lumihull/base/job.h>
-#include <lumihull/calib/calibrate.h>
 #include <lumihull/calib/color_key.h>
 
 #include <cstdint>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "coarse_hull.h"
+#include "sheets.h"
 
 namespace lumihull::hull {
 
@@ -20,11 +20,10 @@ namespace lumihull::hull {
 /// alike; but a calibration knows where sheets hang, and so which colours occur there and not beside them.
 class PaperColors {
  public:
-  /// bodies: as solved; those that are not placed tell nothing. photos: the views' pictures, thinned, 8 bits, 3
-  /// channels. hull: where the object is. nullopt where no photograph shows a sheet beside the hull.
-  static std::optional<PaperColors> learn(std::span<const calib::CalibratedBody> bodies,
-                                          std::span<const CoarseView> views, std::span<const Image> photos,
-                                          const CoarseHull& hull, Job& job);
+  /// photos: the views' pictures, thinned, 8 bits, 3 channels. hull: where the object is. nullopt where no photograph
+  /// shows a sheet beside the hull.
+  static std::optional<PaperColors> learn(std::span<const Sheet> sheets, std::span<const CoarseView> views,
+                                          std::span<const Image> photos, const CoarseHull& hull, Job& job);
 
   /// Whether a colour is hardly a wall's. Clipped colours are nobody's.
   bool is_paper(const std::uint8_t* rgb) const {

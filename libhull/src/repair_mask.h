@@ -3,6 +3,7 @@
 #include <lumihull/base/image.h>
 #include <lumihull/base/job.h>
 #include <lumihull/calib/calibrate.h>
+#include <lumihull/calib/color_key.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -12,14 +13,12 @@
 #include <vector>
 
 #include "coarse_hull.h"
+#include "local_colors.h"
 #include "paper_colors.h"
+#include "shadows.h"
+#include "sheets.h"
 
 namespace lumihull::hull {
-
-/// What lies in the enclosure's shadow: darker than the enclosure and more saturated, for what light reaches a shadow
-/// has met a wall before. Sets such object pixels to 0. background: the enclosure's usual colour; a grey one has no
-/// such shadows. mask, photo: 8 bits, of one size.
-void take_shadows(Image& mask, const Image& photo, const calib::Rgb& background);
 
 /// Mends masks by what the other views say: where the object took on the enclosure's colour or that of the sheets in
 /// it, and where a mask holds what none of the others does.
@@ -35,6 +34,7 @@ class MaskRepair {
     std::span<const Image> photos;                  ///< the same pictures, thinned, 8 bits, 3 channels
     std::span<const std::uint8_t> fixed;            ///< 1: a mask that votes and is not changed
     std::span<const calib::CalibratedBody> sheets;  ///< targets as solved, if known
+    const calib::ColorKey* key = nullptr;           ///< that made the masks; must be given where sheets are known
     std::optional<calib::Rgb> background;           ///< whose shadows are taken off; none: the masks are without them
     /// 0; or so many voxels deep must a mask show background to be doubted, where the key was learned from the
     /// photographs: it knows the colours at the hull's rim.
@@ -50,10 +50,15 @@ class MaskRepair {
  private:
   MaskRepair(CoarseHull hull, CoarseHull wide) : hull_(std::move(hull)), wide_(std::move(wide)) {}
   static std::optional<MaskRepair> carve(std::span<const CoarseView> views, Job& job);
+  void learn_sheets(const Source& source, Job& job);
+  void abstain_on_sheets(const CoarseView& view, const Image& photo, const Image& parts, Image& mask) const;
+  Clues clues(const Image& parts) const;
 
   CoarseHull hull_, wide_;
+  std::vector<Sheet> sheets_;
   std::optional<PaperColors> paper_;
-  std::optional<calib::Rgb> background_;
+  std::optional<calib::ColorKey> beside_sheets_;
+  std::optional<Shadows> shadows_;
   int least_deep_ = 0;
 };
 

@@ -47,7 +47,7 @@ Image key_image(const ColorKey& key, const Image& photo, const KeyImageOptions& 
   for (int y = 0; y < rgb.height(); ++y) key.decide(rgb.row<std::uint8_t>(y), std::size_t(rgb.width()), mask.row(y));
   clean(mask, options.smallest_object_px, options.largest_hole_px);
   Image out = mask.expanded();
-  if (options.edges != EdgeMode::hard) soften(mask, rgb, options.edges, out);
+  if (options.edges != EdgeMode::hard) soften(mask, rgb, options.edges, false, out);
   return out;
 }
 
@@ -56,7 +56,7 @@ void soften_edges(Image& mask, const Image& photo, EdgeMode mode) {
   assert(mask.type() == PixelType::u8 && mask.channels() == 1 && photo.type() == PixelType::u8 &&
          photo.channels() == 3);
   assert(mask.width() == photo.width() && mask.height() == photo.height());
-  soften(BitMask(mask), photo, mode, mask);
+  soften(BitMask(mask), photo, mode, true, mask);
 }
 
 void clean_mask(Image& mask, int smallest_object_px, int largest_hole_px) {

@@ -13,7 +13,7 @@
 namespace lumihull::calib {
 namespace {
 
-constexpr int kRadius = 3;             // of the window for local means, px
+constexpr int kWide = 3, kClose = 2;   // radius of the window for local means, px
 constexpr float kLeastContrast = 400;  // |F - B|², 8-bit values: below it colours say nothing about coverage
 // Squared distance from the line through B and F up to which a colour may be a mixture: noise, and a share of |F - B|².
 constexpr float kNoise = 300, kPlay = 0.02f;
@@ -63,11 +63,11 @@ class ChannelSums {
 };
 #endif
 
-/// Sum of the colours of a window's pixels that are set.
-Mean mean_of(const BitMask& mask, const Image& rgb, int x, int y) {
+/// Sum of the colours of a window's pixels that are set. radius: at most 3.
+Mean mean_of(const BitMask& mask, const Image& rgb, int x, int y, int radius) {
   Mean mean;
-  const int x0 = std::max(0, x - kRadius), x1 = std::min(mask.width - 1, x + kRadius);
-  const int y0 = std::max(0, y - kRadius), y1 = std::min(mask.height - 1, y + kRadius);
+  const int x0 = std::max(0, x - radius), x1 = std::min(mask.width - 1, x + radius);
+  const int y0 = std::max(0, y - radius), y1 = std::min(mask.height - 1, y + radius);
   const auto window_of = [&](int v) {
     const std::uint64_t* row = mask.row(v);
     std::uint64_t window = row[x0 >> 6] >> (x0 & 63);
@@ -102,13 +102,15 @@ Mean mean_of(const BitMask& mask, const Image& rgb, int x, int y) {
 
 }  // namespace
 
-void soften(const BitMask& decisions, const Image& rgb, EdgeMode mode, Image& out) {
+void soften(const BitMask& decisions, const Image& rgb, EdgeMode mode, bool on_edges, Image& out) {
   // The uniform foreground makes nearly every mixed colour object: the band that is not to be trusted lies mostly on
-  // the object's side of the boundary.
+  // the object's side of the boundary. Where that is on the edges already, colours are taken from close by: a shiny
+  // object's rim mirrors what is behind it, and those from farther in would make the object too small.
+  const int radius = on_edges ? kClose : kWide;
   const BitMask background = complement(decisions);
   const BitMask sure_background = eroded(background, false);
-  const BitMask inner = eroded(decisions, true), sure_object = eroded(inner, false);
   const BitMask narrow_object = eroded(decisions, false);
+  const BitMask sure_object = on_edges ? narrow_object : eroded(eroded(decisions, true), false);
   for (int y = 0; y < decisions.height; ++y) {
     std::uint8_t* alpha = out.row<std::uint8_t>(y);
     const std::uint8_t* pixels = rgb.row<std::uint8_t>(y);
@@ -118,10 +120,10 @@ void soften(const BitMask& decisions, const Image& rgb, EdgeMode mode, Image& ou
       std::uint64_t edge = (object & ~trusted_object) | (background.row(y)[w] & ~sure_background.row(y)[w]);
       for (; edge; edge &= edge - 1) {
         const int x = 64 * w + std::countr_zero(edge);
-        const Mean b = mean_of(sure_background, rgb, x, y);
+        const Mean b = mean_of(sure_background, rgb, x, y, radius);
         if (b.count == 0) continue;
-        Mean f = mean_of(sure_object, rgb, x, y);
-        if (f.count == 0) f = mean_of(narrow_object, rgb, x, y);
+        Mean f = mean_of(sure_object, rgb, x, y, radius);
+        if (f.count == 0) f = mean_of(narrow_object, rgb, x, y, radius);
         if (f.count == 0) continue;
         float along = 0, length = 0, distance = 0;
         for (std::size_t c = 0; c < 3; ++c) {

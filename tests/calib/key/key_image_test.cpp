@@ -99,6 +99,27 @@ TEST(KeyImage, MatteFindsTheCoverageOfADisc) {
   }
 }
 
+TEST(KeyImage, AShinyRimHardlyMovesAnEdgeThatIsKnown) {
+  // The disc's rim mirrors the green behind it, four pixels deep.
+  Disc d = disc(60.1, 58.7, 35.3, 2);
+  for (int y = 0; y < 120; ++y)
+    for (int x = 0; x < 128; ++x) {
+      const double depth = std::max(0.0, 35.3 - std::hypot(x + 0.5 - 60.1, y + 0.5 - 58.7));
+      const double mirrored = d.coverage.row<float>(y)[x] * 0.5 * std::exp(-depth / 2);
+      std::uint8_t* p = d.photo.row<std::uint8_t>(y) + 3 * x;
+      for (std::size_t c = 0; c < 3; ++c)
+        p[c] = std::uint8_t(std::lround((1 - mirrored) * p[c] + mirrored * kGreen[c]));
+    }
+  Image mask(128, 120, 1);
+  for (int y = 0; y < 120; ++y)
+    for (int x = 0; x < 128; ++x) mask.row<std::uint8_t>(y)[x] = d.coverage.row<float>(y)[x] >= 0.5f ? 255 : 0;
+  soften_edges(mask, d.photo, EdgeMode::matte);
+  double area = 0;
+  for (int y = 0; y < 120; ++y)
+    for (int x = 0; x < 128; ++x) area += mask.row<std::uint8_t>(y)[x] / 255.0;
+  EXPECT_NEAR((area - d.area) / std::sqrt(4 * M_PI * d.area), 0, 0.25);
+}
+
 TEST(KeyImage, DeeperPicturesAreKeyedByTheRoundingRule) {
   const ColorKey key = green_key();
   Image deep(256, 4, 3, PixelType::u16), real(256, 4, 3, PixelType::f32);

@@ -34,11 +34,12 @@ LUMIHULL_API Image key_image(const ColorKey& key, const Image& photo, const KeyI
 /// An 8-bit, 3-channel picture by the rule above (a copy where it already is one).
 LUMIHULL_API Image keyable(const Image& photo);
 
-/// Replaces the edge of a silhouette by coverage. `mask`: 8 bits, 1 channel, decisions as >= 128; `photo`: 8 bits, 3
-/// channels, the same size.
+/// Replaces the edge of a silhouette by coverage. `mask`: 8 bits, 1 channel, decisions as >= 128, to within a pixel of
+/// the photograph's edges; `photo`: 8 bits, 3 channels, the same size.
 ///
 /// In a pixel beside the decision's boundary the colour is c = α F + (1 − α) B; F and B are means over confident
-/// pixels of a small window (those away from any boundary), and α is the projection (c − B)·(F − B) / |F − B|², as in
+/// pixels of a small window (those away from any boundary), as close by as can be, for a shiny object's rim mirrors
+/// what is behind it; and α is the projection (c − B)·(F − B) / |F − B|², as in
 /// Smith & Blinn 1996 for known B and F. Pixels without confident neighbours on both sides keep their decision.
 LUMIHULL_API void soften_edges(Image& mask, const Image& photo, EdgeMode mode);
 
