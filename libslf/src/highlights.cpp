@@ -46,6 +46,32 @@ bool fits(const Image& image, const Camera& camera) {
          image.width() == camera.width && image.height() == camera.height;
 }
 
+/// At each pixel how much a misplacement by one pixel, the worst of four, changes a picture that is smoothed then.
+Plane shaken(const Plane& picture) {
+  const int w = picture.width, h = picture.height, r = smoothing_radius(picture);
+  Plane most{w, h, std::vector<float>(picture.values.size(), 0)}, change = most;
+  constexpr int kShifts[][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+  for (const auto& [dx, dy] : kShifts) {
+    for (int y = 0; y < h; ++y)
+      for (int x = 0; x < w; ++x)
+        change.values[std::size_t(y) * std::size_t(w) + std::size_t(x)] =
+            picture.at(std::clamp(x + dx, 0, w - 1), std::clamp(y + dy, 0, h - 1)) - picture.at(x, y);
+    smooth(change, r);
+    for (std::size_t i = 0; i < most.values.size(); ++i)
+      most.values[i] = std::max(most.values[i], std::abs(change.values[i]));
+  }
+  return most;
+}
+
+/// As far around a place as smoothing reaches.
+float largest_near(const Plane& plane, const Vector2d& pixel) {
+  const int r = smoothing_radius(plane) + 1, x = int(pixel.x()), y = int(pixel.y());
+  float most = 0;
+  for (int j = std::max(0, y - r); j <= std::min(plane.height - 1, y + r); ++j)
+    for (int i = std::max(0, x - r); i <= std::min(plane.width - 1, x + r); ++i) most = std::max(most, plane.at(i, j));
+  return most;
+}
+
 /// Where a highlight is, in a picture and on the surface.
 struct Place {
   Vector2d pixel;
@@ -251,7 +277,8 @@ void HighlightJudge::add_view(const View& view, const Image& without, const Imag
     }
   smooth(gloss, smoothing_radius(gloss));
   v.places = impl.places_of(view, gloss);
-  std::erase_if(v.places, [](const Place& p) { return !p.point; });
+  const Plane doubt = shaken(v.without);
+  std::erase_if(v.places, [&](const Place& p) { return !p.point || kFound * p.height < largest_near(doubt, p.pixel); });
   impl.views.push_back(std::move(v));
   JudgedView& added = impl.views.back();
   Shown shown = impl.measured(kPhotograph, photograph);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "texel_fit.h"
@@ -15,6 +16,7 @@
 namespace lumihull::slf {
 namespace {
 
+constexpr int kTrialIterations = 3;
 constexpr float kTowardsNodes = 0.05f;  // pulls a photograph's view maps to what the nodes say, in shares of the weight
 
 /// Polynomials of a direction, degree 1 to 3: smooth functions to start from.
@@ -38,11 +40,13 @@ void polynomials(const Eigen::Vector3f& d, std::span<float> out) {
 }  // namespace
 
 JointFit::JointFit(const hull::Mesh& mesh, const Atlas& atlas, std::span<const PhotoSamples> photos,
-                   std::span<const Eigen::Vector3f> nodes, const JointFitOptions& options)
+                   std::span<const Eigen::Vector3f> nodes, std::span<const std::uint32_t> at_node,
+                   const JointFitOptions& options)
     : mesh_(mesh),
       atlas_(atlas),
       photos_(photos),
       nodes_(nodes),
+      at_node_(at_node),
       options_(options),
       terms_(std::size_t(options.terms)),
       vertices_(mesh.vertices.size()),
@@ -53,29 +57,44 @@ JointFit::JointFit(const hull::Mesh& mesh, const Atlas& atlas, std::span<const P
 }
 
 JointFactors JointFit::run(Job& job) {
+  job.begin("factors", std::uint64_t(terms_ ? options_.iterations : 0) + 1);
+  alternate(options_.iterations, job);
+  if (terms_ ? kept() == 0 : options_.mean_alone) normals_ = hull::vertex_normals(mesh_);
+  std::vector<std::uint32_t> all(photos_.size());
+  std::iota(all.begin(), all.end(), 0u);
+  fit_surface(all, job);
+  if (terms_) normalise();
+  job.advance();
+  job.end();
+  return std::move(factors_);
+}
+
+double JointFit::left_out(const ReflectionFit* reflection, Job& job) {
+  job.begin("factors on trial", std::uint64_t(kTrialIterations));
+  reflection_ = reflection;
+  alternate(std::min(kTrialIterations, options_.iterations), job);
+  job.end();
+  return left_out_;
+}
+
+/// Surface maps and view maps by turns, and in the end which terms hold.
+void JointFit::alternate(int iterations, Job& job) {
   const std::size_t texels = atlas_.texels.size();
   factors_.mean.assign(texels * 3, 0);
   factors_.seen.assign(texels, 0);
   factors_.surface.assign(texels * terms_ * 3, 0);
   factors_.view.assign(vertices_ * nodes_.size() * terms_, 0);
-  const auto steps = std::uint64_t(terms_ ? options_.iterations : 0) + 1;
-  job.begin("factors", steps);
-  if (terms_) start();
-  for (int i = 0; terms_ && i < options_.iterations; ++i) {
-    fit_surface(job);
+  if (!terms_) return;
+  start();
+  for (int i = 0; i < iterations; ++i) {
+    fit_surface(at_node_, job);
     normalise();
     fit_views(job);
     fit_nodes(job);
-    if (i + 1 == options_.iterations) cross_validate(job);
+    if (i + 1 == iterations) cross_validate(job);
     evaluate_nodes(job);
     job.advance();
   }
-  if (terms_ ? kept() == 0 : options_.mean_alone) normals_ = hull::vertex_normals(mesh_);
-  fit_surface(job);
-  if (terms_) normalise();
-  job.advance();
-  job.end();
-  return std::move(factors_);
 }
 
 void JointFit::start() {
@@ -144,7 +163,7 @@ float JointFit::frontal(const Texel& texel, std::size_t photo) const {
 }
 
 /// Mean colour and surface maps of every texel.
-void JointFit::fit_surface(Job& job) {
+void JointFit::fit_surface(std::span<const std::uint32_t> photos, Job& job) {
   struct Sums {
     double with = 0, mean = 0, weight = 0;
   };
@@ -155,7 +174,7 @@ void JointFit::fit_surface(Job& job) {
     for (std::size_t b = chunk * kBlocksAtOnce; b < std::min(blocks_, (chunk + 1) * kBlocksAtOnce); ++b) {
       const std::uint32_t begin = atlas_.blocks[b], end = atlas_.blocks[b + 1];
       fit.clear(end - begin);
-      for (std::size_t p = 0; p < photos_.size(); ++p) add_samples(fit, b, p);
+      for (const std::uint32_t p : photos) add_samples(fit, b, p);
       for (std::size_t texel = begin; texel < end; ++texel) {
         factors_.seen[texel] = fit.weight(texel - begin);
         fit.solve(texel - begin, &factors_.mean[texel * 3], factors_.surface.data() + texel * terms_ * 3);
@@ -172,7 +191,7 @@ void JointFit::fit_surface(Job& job) {
 }
 
 void JointFit::fit_views(Job& job) {
-  parallel_for(job, photos_.size(), [&](std::size_t p) { fit_view(p); });
+  parallel_for(job, at_node_.size(), [&](std::size_t i) { fit_view(at_node_[i]); });
 }
 
 /// The view maps of all vertices at one photograph: they are coupled where they share triangles.
@@ -219,15 +238,17 @@ void JointFit::fit_nodes(Job& job) {
 void JointFit::regress(std::size_t v, NodeRegression& regression, std::size_t left_out, std::span<float> out) const {
   std::array<float, kMaxStartTerms> mean{}, value{};
   float weight = 0;
-  for (std::size_t p = 0; p < photos_.size(); ++p) {
-    if (!(trust_[p][v] > 0) || p % kFolds == left_out) continue;
+  for (std::size_t i = 0; i < at_node_.size(); ++i) {
+    const std::size_t p = at_node_[i];
+    if (!(trust_[p][v] > 0) || i % kFolds == left_out) continue;
     weight += trust_[p][v];
     for (std::size_t k = 0; k < terms_; ++k) mean[k] += trust_[p][v] * views_[p][v * terms_ + k];
   }
   for (float& m : mean) m = weight > 0 ? m / weight : 0;
   regression.clear();
-  for (std::size_t p = 0; p < photos_.size(); ++p) {
-    if (!(trust_[p][v] > 0) || p % kFolds == left_out) continue;
+  for (std::size_t i = 0; i < at_node_.size(); ++i) {
+    const std::size_t p = at_node_[i];
+    if (!(trust_[p][v] > 0) || i % kFolds == left_out) continue;
     for (std::size_t k = 0; k < terms_; ++k) value[k] = views_[p][v * terms_ + k] - mean[k];
     regression.add(weights_[p][v], trust_[p][v], {value.data(), terms_});
   }
@@ -241,7 +262,7 @@ void JointFit::normalise() {
   using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(k, k), g = Eigen::MatrixXd::Zero(k, k);
   double count = 0;
-  for (std::size_t p = 0; p < photos_.size(); ++p)
+  for (const std::uint32_t p : at_node_)
     for (std::size_t v = 0; v < vertices_; ++v) {
       if (!(trust_[p][v] > 0)) continue;
       const Eigen::Map<const Eigen::VectorXf> a(view_at(p, v), k);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "atlas.h"
+#include "reflection_fit.h"
 #include "surface_samples.h"
 #include "texel_fit.h"
 #include "view_nodes.h"
@@ -34,16 +35,23 @@ struct JointFactors {
   std::vector<float> view;
 };
 
-/// min Σ w |c - T - Σ_k g_k Σ_j Λ_j h_k[v_j](e)|² over all samples by turns: surface maps and mean colour of each texel
-/// exactly; then the view maps of all vertices together for each photograph; then the values at the nodes that agree
-/// best with these. See README, "Joint factorisation".
+/// min Σ w |c - T - Σ_k g_k Σ_j Λ_j h_k[v_j](e)|² over the samples of the photographs at the nodes by turns: surface
+/// maps and mean colour of each texel exactly; then the view maps of all vertices together for each photograph; then the
+/// values at the nodes that agree best with these. In the end surface maps and mean colour once more, over all
+/// photographs' samples. See README, "Joint factorisation".
 class JointFit {
  public:
-  /// What is given must outlive the object.
+  /// nodes: places; at_node: the photographs there, ascending. What is given must outlive the object.
   JointFit(const hull::Mesh& mesh, const Atlas& atlas, std::span<const PhotoSamples> photos,
-           std::span<const Eigen::Vector3f> nodes, const JointFitOptions& options);
+           std::span<const Eigen::Vector3f> nodes, std::span<const std::uint32_t> at_node,
+           const JointFitOptions& options);
 
   JointFactors run(Job& job);
+
+  /// Root mean square at samples of photographs that had no part in the fit, in colours as they are shown: with the
+  /// terms, or with the mean colour alone where that is less. Needs terms. reflection: what was taken off the samples;
+  /// null: nothing. For comparisons: fewer turns than run makes.
+  double left_out(const ReflectionFit* reflection, Job& job);
 
   /// How many terms, the first ones, hold at photographs that had no part in them; the others are zero.
   std::size_t kept() const {
@@ -54,7 +62,7 @@ class JointFit {
   double rms = 0, rms_of_mean = 0;
 
  private:
-  static constexpr std::size_t kFolds = 4;  // photographs p, p + 4, … are left out together
+  static constexpr std::size_t kFolds = 4;  // of those at nodes every fourth is left out together
   static constexpr std::size_t kNoFold = kFolds;
   static constexpr std::size_t kBlocksAtOnce = 32, kVerticesAtOnce = 64;
 
@@ -62,12 +70,13 @@ class JointFit {
   void evaluate_nodes(Job& job);
   void add_samples(TexelFit& fit, std::size_t block, std::size_t photo) const;
   float frontal(const Texel& texel, std::size_t photo) const;
-  void fit_surface(Job& job);
+  void fit_surface(std::span<const std::uint32_t> photos, Job& job);
   void fit_views(Job& job);
   void fit_nodes(Job& job);
   void regress(std::size_t vertex, NodeRegression& regression, std::size_t left_out, std::span<float> out) const;
   void normalise();
   void fit_view(std::size_t photo);
+  void alternate(int iterations, Job& job);
   void cross_validate(Job& job);
 
   /// Values of all terms at a texel from those at the vertices of the mesh (vertices x terms).
@@ -79,6 +88,7 @@ class JointFit {
   const Atlas& atlas_;
   std::span<const PhotoSamples> photos_;
   std::span<const Eigen::Vector3f> nodes_;
+  std::span<const std::uint32_t> at_node_;
   JointFitOptions options_;
   std::size_t terms_, vertices_, blocks_;
   Eigen::Vector3f middle_;
@@ -90,6 +100,8 @@ class JointFit {
   std::vector<std::vector<float>> views_;               // photographs x vertices x terms: view maps at the photographs
   std::vector<std::vector<float>> trust_;               // photographs x vertices: the weight behind them
   std::vector<float> share_;                            // of each term, see cross_validate; empty before
+  const ReflectionFit* reflection_ = nullptr;           // where colours as they are shown are asked for
+  double left_out_ = 0;
   JointFactors factors_;
 };
 

@@ -1,6 +1,9 @@
+#include <lumihull/base/image.h>
 #include <lumihull/base/parallel.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "joint_fit.h"
 
@@ -21,6 +24,13 @@ Eigen::VectorXd bounded_least_squares(const Eigen::MatrixXd& normal, const Eigen
   return s;
 }
 
+/// An sRGB colour with what is mirrored on top, linear light.
+Eigen::Vector3f shown(const Eigen::Vector3f& color, const Eigen::Vector3f& mirrored) {
+  if (mirrored.isZero(0)) return color;
+  return (color.unaryExpr([](float c) { return linear_from_srgb(std::clamp(c, 0.0f, 1.0f)); }) + mirrored)
+      .unaryExpr([](float light) { return srgb_from_linear(std::clamp(light, 0.0f, 1.0f)); });
+}
+
 }  // namespace
 
 /// How much of each term holds at photographs that had no part in it. By folds, view maps at the left-out photographs
@@ -33,8 +43,8 @@ Eigen::VectorXd bounded_least_squares(const Eigen::MatrixXd& normal, const Eigen
 /// the samples by less than half a byte is dropped.
 void JointFit::cross_validate(Job& job) {
   const auto k = std::ptrdiff_t(terms_);
-  const std::size_t size = nodes_.size() * terms_, folds = std::min(kFolds, photos_.size());
-  std::vector<std::vector<float>> predicted(photos_.size());
+  const std::size_t size = nodes_.size() * terms_, folds = std::min(kFolds, at_node_.size());
+  std::vector<std::vector<float>> predicted(at_node_.size());
   for (auto& views : predicted) views.assign(vertices_ * terms_, 0);
   parallel_chunks(job, vertices_, kVerticesAtOnce, [&](std::size_t first, std::size_t last) {
     NodeRegression regression(laplacian_, options_.view_smoothness, terms_);
@@ -42,8 +52,8 @@ void JointFit::cross_validate(Job& job) {
     for (std::size_t v = first; v < last; ++v)
       for (std::size_t fold = 0; fold < folds; ++fold) {
         regress(v, regression, fold, values);
-        for (std::size_t p = fold; p < photos_.size(); p += kFolds)
-          blend_nodes(weights_[p][v], values, {&predicted[p][v * terms_], terms_});
+        for (std::size_t i = fold; i < at_node_.size(); i += kFolds)
+          blend_nodes(weights_[at_node_[i]][v], values, {&predicted[i][v * terms_], terms_});
       }
   });
 
@@ -51,6 +61,7 @@ void JointFit::cross_validate(Job& job) {
   std::vector<Eigen::MatrixXd> normals(chunks, Eigen::MatrixXd::Zero(k, k));
   std::vector<Eigen::VectorXd> rights(chunks, Eigen::VectorXd::Zero(k));
   std::vector<double> weights(chunks, 0);
+  std::vector<std::array<double, 2>> errors(chunks, {0, 0});  // of the mean colour, of all terms
   parallel_for(job, chunks, [&](std::size_t chunk) {
     TexelFit fit(terms_, options_.surface_ridge);
     std::vector<float> means, surfaces, view(terms_);
@@ -60,17 +71,18 @@ void JointFit::cross_validate(Job& job) {
       const std::uint32_t begin = atlas_.blocks[b], count = atlas_.blocks[b + 1] - begin;
       for (std::size_t fold = 0; fold < folds; ++fold) {
         fit.clear(count);
-        for (std::size_t p = 0; p < photos_.size(); ++p)
-          if (p % kFolds != fold) add_samples(fit, b, p);
+        for (std::size_t i = 0; i < at_node_.size(); ++i)
+          if (i % kFolds != fold) add_samples(fit, b, at_node_[i]);
         means.assign(count * 3, 0), surfaces.assign(count * terms_ * 3, 0);
         for (std::size_t i = 0; i < count; ++i) fit.solve(i, &means[i * 3], &surfaces[i * terms_ * 3]);
-        for (std::size_t p = fold; p < photos_.size(); p += kFolds) {
+        for (std::size_t left_out = fold; left_out < at_node_.size(); left_out += kFolds) {
+          const std::size_t p = at_node_[left_out];
           if (photos_[p].first[b] == kUnseen) continue;
           const SurfaceSample8* samples = &photos_[p].samples[photos_[p].first[b]];
           for (std::size_t i = 0; i < count; ++i) {
             const float w = samples[i].weight();
             if (w == 0 || fit.weight(i) == 0) continue;
-            interpolate(predicted[p], atlas_.texels[begin + i], view.data());
+            interpolate(predicted[left_out], atlas_.texels[begin + i], view.data());
             const Eigen::Map<const Eigen::Matrix<float, 3, Eigen::Dynamic>> g(&surfaces[i * terms_ * 3], 3, k);
             part = g * Eigen::Map<const Eigen::VectorXf>(view.data(), k).asDiagonal();
             const std::array<float, 3> c = color_of(samples[i]);
@@ -79,6 +91,12 @@ void JointFit::cross_validate(Job& job) {
             normals[chunk] += (w * (part.transpose() * part)).cast<double>();
             rights[chunk] += (w * (part.transpose() * left)).cast<double>();
             weights[chunk] += 3.0 * w;
+            Eigen::Vector3f off = Eigen::Vector3f::Zero();
+            if (reflection_) off = mirrored_at(*reflection_, mesh_, atlas_.texels[begin + i], photos_[p].center);
+            const Eigen::Vector3f sample = Eigen::Map<const Eigen::Vector3f>(c.data()), own = sample - left;
+            const Eigen::Vector3f seen = shown(sample, off);
+            errors[chunk][0] += double(w * (seen - shown(own, off)).squaredNorm());
+            errors[chunk][1] += double(w * (seen - shown(own + part.rowwise().sum(), off)).squaredNorm());
           }
         }
       }
@@ -86,8 +104,10 @@ void JointFit::cross_validate(Job& job) {
   });
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(k, k);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(k);
-  double weight = 0;
+  double weight = 0, of_mean = 0, of_terms = 0;
+  for (const auto& e : errors) of_mean += e[0], of_terms += e[1];
   for (std::size_t i = 0; i < chunks; ++i) normal += normals[i], right += rights[i], weight += weights[i];
+  left_out_ = weight > 0 ? std::sqrt(std::min(of_mean, of_terms) / weight) : 0;
   const Eigen::VectorXd s = bounded_least_squares(normal, right);
   share_.clear();
   for (std::ptrdiff_t i = 0; i < k; ++i) {

@@ -26,8 +26,7 @@
 namespace lumihull::slf {
 namespace {
 
-// What mirroring must explain to be kept: a share of the variance, and so much light.
-constexpr double kLeastReflection = 1.0 / 3, kLeastMirrored = 0.004;
+constexpr double kLeastMirrored = 0.004;  // root mean square of what holds of a reflection, below which it is dropped
 
 void check(const LightFieldOptions& o) {
   constexpr const char* kWhose = "light field options";
@@ -55,7 +54,10 @@ std::vector<BlendColor> mean_colors(const hull::Mesh& mesh, const Atlas& atlas, 
 
 LightFieldReflection reflection_of(const ReflectionFit& fit) {
   LightFieldReflection out;
+  out.center = fit.around.center, out.inverse_radius = fit.around.inverse_radius;
   out.normals = fit.normals;
+  out.strength_scale = {kMostStrength, 0};
+  for (const float s : fit.strength) out.strength.push_back(to_byte(s, out.strength_scale));
   const auto picture = [&](std::size_t first, ByteScale& scale) {
     const std::span<const Eigen::Vector3f> light(&fit.light[first], std::size_t(kReflectionSide * kReflectionSide));
     float low = 0, high = 0;
@@ -72,13 +74,34 @@ LightFieldReflection reflection_of(const ReflectionFit& fit) {
   return out;
 }
 
-std::vector<Eigen::Vector3f> nodes_of(const hull::Mesh& mesh, std::span<const PhotoSamples> samples, std::size_t most) {
-  std::vector<Eigen::Vector3f> places, nodes;
+/// The photographs whose places are nodes, ascending.
+std::vector<std::uint32_t> photos_at_nodes(const hull::Mesh& mesh, std::span<const PhotoSamples> samples,
+                                           std::size_t most) {
+  std::vector<Eigen::Vector3f> places;
   for (const PhotoSamples& p : samples) places.push_back(p.center);
   Eigen::AlignedBox3f box;
   for (const auto& v : mesh.vertices) box.extend(v);
-  for (const std::uint32_t i : choose_nodes(places, box.center(), most)) nodes.push_back(places[i]);
-  return nodes;
+  return choose_nodes(places, box.center(), most);
+}
+
+/// Whether photographs that had no part in the fit are met better with the reflection than without it, terms included
+/// both times; by those at the nodes.
+bool lowers_error(const ReflectionFit& reflection, const hull::Mesh& mesh, const Atlas& atlas,
+                  std::span<const PhotoSamples> samples, std::span<const std::uint32_t> at_node,
+                  const JointFitOptions& options, Job& job) {
+  if (!(reflection.held > 0 && reflection.held_rms > kLeastMirrored)) return false;
+  if (options.terms == 0) return true;
+  std::vector<PhotoSamples> trial;
+  std::vector<Eigen::Vector3f> nodes;
+  std::vector<std::uint32_t> all;
+  for (const std::uint32_t i : at_node) {
+    all.push_back(std::uint32_t(trial.size()));
+    nodes.push_back(samples[i].center);
+    trial.push_back(samples[i]);
+  }
+  const double without = JointFit(mesh, atlas, trial, nodes, all, options).left_out(nullptr, job);
+  take_off(reflection, mesh, atlas, trial, job);
+  return JointFit(mesh, atlas, trial, nodes, all, options).left_out(&reflection, job) < without;
 }
 
 }  // namespace
@@ -105,14 +128,19 @@ void validate(const LightField& field, const std::string& name) {
   }
   if (field.reflection) {
     const LightFieldReflection& r = *field.reflection;
-    if (r.normals.size() != vertices) fail("reflection: expected a normal for each vertex");
+    if (r.normals.size() != vertices || r.strength.size() != vertices)
+      fail("reflection: expected a normal and a strength for each vertex");
+    if (!r.center.allFinite() || !std::isfinite(r.inverse_radius) || r.inverse_radius < 0)
+      fail("reflection: expected a sphere with a finite centre and a radius above 0");
+    for (const auto& v : field.base.mesh.vertices)
+      if (!(r.inverse_radius * (v - r.center).norm() < 1)) fail("reflection: the sphere does not hold all vertices");
     for (const auto& n : r.normals)
       if (!n.allFinite() || std::abs(n.norm() - 1) > 0.02f) fail("reflection: expected normals of unit length");
     for (const Image* map : {&r.light, &r.grazing})
       if (map->width() != map->height() || map->width() < 3 || map->width() > 1024 || map->width() != r.light.width() ||
           map->channels() != 3 || map->type() != PixelType::u8)
         fail("reflection: expected two square maps of 8-bit RGB, 3 to 1024 pixels a side");
-    for (const ByteScale& s : {r.light_scale, r.grazing_scale})
+    for (const ByteScale& s : {r.light_scale, r.grazing_scale, r.strength_scale})
       if (!std::isfinite(s.scale) || !std::isfinite(s.offset)) fail("reflection: scale and offset are not finite");
   }
   if (field.terms.size() > std::size_t(kMaxTerms)) fail("expected at most 12 terms");
@@ -164,23 +192,24 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
   }
 
   LightField field;
+  const std::vector<std::uint32_t> at_node = photos_at_nodes(mesh, samples, std::size_t(options.max_nodes));
+  for (const std::uint32_t i : at_node) field.nodes.push_back(samples[i].center);
+  const JointFitOptions fit_options{joint ? options.terms : 0, options.iterations, options.surface_ridge,
+                                    options.view_smoothness, !rings_apart};
   double reflection_share = 0;
   if (joint && options.reflections) {
     const ReflectionFit reflection = fit_reflection(mesh, atlas, samples, job);
-    reflection_share = 1 - reflection.left;
-    if (reflection_share > kLeastReflection && reflection.explained_rms > kLeastMirrored) {
+    reflection_share = reflection.held;
+    if (lowers_error(reflection, mesh, atlas, samples, at_node, fit_options, job)) {
       take_off(reflection, mesh, atlas, samples, job);
       field.reflection = reflection_of(reflection);
     }
   }
   field.base.mesh = mesh;
   field.up = up_axis(photos.views).cast<float>();
-  field.nodes = nodes_of(mesh, samples, std::size_t(options.max_nodes));
   field.adds_base = !non_negative || options.terms == 0;
 
-  JointFit fit(
-      mesh, atlas, samples, field.nodes,
-      {joint ? options.terms : 0, options.iterations, options.surface_ridge, options.view_smoothness, !rings_apart});
+  JointFit fit(mesh, atlas, samples, field.nodes, at_node, fit_options);
   const JointFactors factors = fit.run(job);
   double rms = fit.rms;
   std::size_t filled = 0;

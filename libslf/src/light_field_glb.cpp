@@ -19,7 +19,7 @@ using internal::Json;
 using internal::JsonReader;
 
 constexpr const char* kExtension = "LUMIHULL_surface_light_field";
-constexpr int kVersion = 1, kVersionWithReflection = 2;  // which readers of the first would not notice
+constexpr int kVersion = 1, kVersionWithReflection = 3;  // which readers of the first would not notice
 constexpr int kUnsignedShort = 5123, kUnsignedInt = 5125;
 constexpr std::uint64_t kMostMapBytes = std::uint64_t(1) << 32;  // of all terms' maps, unpacked
 constexpr std::size_t kMostInflation = 1032;  // deflate's: a run of 258 bytes takes two bits (RFC 1951, 3.2.5)
@@ -136,6 +136,14 @@ LightField light_field_of(const GlbFile& file) {
       if (n.isZero()) json.at("normals").fail("normals that are not zero");
       r.normals.push_back(n.normalized());
     }
+    const std::string_view strength = file.view(glb_index(json.at("strength")));
+    if (strength.size() != vertices) json.at("strength").fail("a byte for each vertex");
+    r.strength.assign(strength.begin(), strength.end());
+    r.strength_scale = scale_of(json.at("strengthScale"));
+    const JsonReader center = json.at("center");
+    if (center.array_size(3) != 3) center.fail("three numbers");
+    for (std::size_t i = 0; i < 3; ++i) r.center[std::ptrdiff_t(i)] = float(center.at(i).number(-1e30, 1e30));
+    r.inverse_radius = float(json.at("inverseRadius").number(0, 1e30));
     r.light = file.texture(glb_index(json.at("light")));
     r.grazing = file.texture_like(r.light, glb_index(json.at("grazing")));
     r.light_scale = scale_of(json.at("lightScale"));
@@ -213,7 +221,14 @@ std::string encode_light_field(const LightField& field, const LightFieldFileOpti
     std::vector<std::int8_t> normals;
     for (const std::uint32_t v : used)
       for (int c = 0; c < 3; ++c) normals.push_back(std::int8_t(std::lround(127 * field.reflection->normals[v][c])));
+    const LightFieldReflection& r = *field.reflection;
+    std::vector<std::uint8_t> strength;
+    for (const std::uint32_t v : used) strength.push_back(r.strength[v]);
     extension["reflection"] = {{"normals", buffer.add_view(normals.data(), normals.size())},
+                               {"strength", buffer.add_view(strength.data(), strength.size())},
+                               {"strengthScale", scale_json(r.strength_scale)},
+                               {"center", {r.center.x(), r.center.y(), r.center.z()}},
+                               {"inverseRadius", r.inverse_radius},
                                {"light", add_picture(encode_png(field.reflection->light), false)},
                                {"lightScale", scale_json(field.reflection->light_scale)},
                                {"grazing", add_picture(encode_png(field.reflection->grazing), false)},

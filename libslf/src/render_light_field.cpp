@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "render_with.h"
-#include "sphere_grid.h"
+#include "mirror.h"
 #include "view_nodes.h"
 
 #ifdef __AVX2__
@@ -137,6 +137,9 @@ LightFieldRenderer::LightFieldRenderer(const LightField& field, int terms)
   if (field.reflection) {
     const LightFieldReflection& r = *field.reflection;
     normals_ = r.normals;
+    mirrored_center_ = r.center, mirrored_inverse_radius_ = r.inverse_radius;
+    for (const std::uint8_t s : r.strength)
+      strength_.push_back(r.strength_scale.scale * float(s) / 255 + r.strength_scale.offset);
     for (const auto& [map, scale] : {std::pair(&r.light, r.light_scale), {&r.grazing, r.grazing_scale}})
       for (int y = 0; y < map->height(); ++y)
         for (int x = 0; x < map->width(); ++x) {
@@ -186,20 +189,15 @@ Rendering LightFieldRenderer::render(const View& view, const RenderOptions& opti
     std::fill_n(&offset[3 * k], 3, map_scales_[k].offset);
   }
   const SphereGrid sphere(std::max(3, int(std::lround(std::sqrt(double(mirrored_light_.size() / 2))))));
+  const Surroundings around{mirrored_center_, mirrored_inverse_radius_};
   const Eigen::Vector3f eye = view.center().cast<float>();
   const auto mirror = [&](const SurfaceSample& s, float* color) {
     const auto& t = mesh_.triangles[s.hit.triangle];
-    const float b0 = 1 - s.hit.b1 - s.hit.b2;
-    const auto between = [&](const std::vector<Eigen::Vector3f>& of) -> Eigen::Vector3f {
-      return b0 * of[t[0]] + s.hit.b1 * of[t[1]] + s.hit.b2 * of[t[2]];
-    };
-    const Eigen::Vector3f to_eye = (eye - between(mesh_.vertices)).stableNormalized(),
-                          normal = between(normals_).stableNormalized();
-    const SphereGrid::Place at = sphere.at(mirrored(to_eye, normal));
-    const float flat = grazing(to_eye.dot(normal));
-    Eigen::Vector3f light = Eigen::Vector3f::Zero();
-    for (std::size_t k = 0; k < 4; ++k)
-      light += at.weight[k] * (mirrored_light_[at.node[k]] + flat * mirrored_light_[sphere.size() + at.node[k]]);
+    const float strength = (1 - s.hit.b1 - s.hit.b2) * strength_[t[0]] + s.hit.b1 * strength_[t[1]] +
+                           s.hit.b2 * strength_[t[2]];
+    const Eigen::Vector3f light =
+        strength * mirrored_light(mirrored_light_, mirror_place(sphere, around, mesh_, normals_, s.hit.triangle,
+                                                                s.hit.b1, s.hit.b2, eye));
     for (int c = 0; c < 3; ++c)
       color[c] =
           srgb_from_linear(std::clamp(linear_from_srgb(std::clamp(color[c], 0.0f, 1.0f)) + light[c], 0.0f, 1.0f));

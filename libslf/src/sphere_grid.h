@@ -57,16 +57,4 @@ class SphereGrid {
   int side_;
 };
 
-/// How much more a place mirrors that is seen flatly. Fresnel's reflectance rises with the fifth power; where normals
-/// are a mesh's, and not that well known, the third was measured to be better (README).
-inline float grazing(float cosine) {
-  const float a = 1 - std::clamp(cosine, 0.0f, 1.0f);
-  return a * a * a;
-}
-
-/// Where a mirror with normal n (of unit length) shows what `to_eye` looks along.
-inline Eigen::Vector3f mirrored(const Eigen::Vector3f& to_eye, const Eigen::Vector3f& normal) {
-  return 2 * normal.dot(to_eye) * normal - to_eye;
-}
-
 }  // namespace lumihull::slf

@@ -83,7 +83,7 @@ void compare_views(const Capture& capture, const fs::path& folder, const truth::
   std::error_code ignored;
   if (out.views->highlights.empty())
     out.left_out.push_back(without("highlights", fs::is_directory(folder / "test_views" / "highlights", ignored)
-                                                     ? "none is seen in two test views in a row"
+                                                     ? "none that can be told from the paint is seen in two test views in a row"
                                                      : "the truth has no test_views/highlights/"));
 }
 

@@ -28,7 +28,9 @@ struct HighlightPath {
 /// height, and their place the centroid of what is above half of that.
 ///
 /// True highlights are spots of the gloss as it truly is (as much of it as is below white) that the photographs show,
-/// too, at least half as strong. Those of two neighbouring views are one where each is the other's nearest on the
+/// too, at least half as strong, and which a picture that misplaces the rest of the object by a pixel could not fake or
+/// hide: 30 % of their height, what is asked of a picture's, is at least what the picture without highlights changes
+/// there when it is shifted by a pixel. Those of two neighbouring views are one where each is the other's nearest on the
 /// surface, by less than two thirds of the distance of the next one; what cannot be told apart is not followed. A
 /// highlight's way is what it moves over the surface: the place in a later view less the place in that view of the
 /// surface's point where it was before. So what is painted on the surface goes no way at all. Steps are at least 1 % of
@@ -51,7 +53,7 @@ class LUMIHULL_API HighlightJudge {
   void add_picture(const std::string& method, const Image& picture);
 
   /// Of each method that has pictures of all views, and of "photograph": the measure's own limit. Empty: no highlight
-  /// is seen in two views in a row.
+  /// that can be told from the paint is seen in two views in a row.
   std::map<std::string, HighlightPath> paths() const;
 
  private:

@@ -36,10 +36,14 @@ struct LightFieldTerm {
   ByteScale view_scale;
 };
 
-/// What all places of the surface mirror alike: linear light on top of their own colour, by the direction that a
-/// place's normal mirrors the eye's to.
+/// What all places of the surface mirror, each as strongly as its material does: linear light on top of their own
+/// colour, by the direction that a place's normal mirrors the eye's to. What is mirrored is taken to lie on a sphere.
 struct LightFieldReflection {
+  Eigen::Vector3f center{0, 0, 0};       ///< of the sphere; directions are from there
+  float inverse_radius = 0;              ///< of the sphere, which holds all vertices; 0: infinitely far away
   std::vector<Eigen::Vector3f> normals;  ///< of the vertices, unit length
+  std::vector<std::uint8_t> strength;    ///< of the vertices
+  ByteScale strength_scale;
   Image light;    ///< square, 8-bit, 3 channels, 3 … 1024 px a side; directions as in SphereGrid
   Image grazing;  ///< as large: what comes on top where a place is seen flatly, times (1 - n·d)³
   ByteScale light_scale, grazing_scale;
@@ -54,8 +58,8 @@ struct LightFieldReflection {
 /// T the base's texture (left out where `adds_base` is false), Λ_j the barycentric coordinates. View maps are values at
 /// nodes, places that an eye may be at: h_k[v](e) = Σ_i w_i(v, e) h_k[v, i], with w the weights of `node_weights`.
 /// Terms are in the order of the energy that they contribute: the last ones may be left out. With a reflection E the
-/// above, to linear light, plus E(r, n·d), back to sRGB, is the colour; r = 2 (n·d) n - d, d the way to the eye, n the
-/// normal interpolated from the corners'.
+/// above, to linear light, plus s(p) E(r, n·d), back to sRGB, is the colour; r = 2 (n·d) n - d, d the way to the eye, n
+/// the normal and s the strength, interpolated from the corners'; r is turned to where it meets the sphere.
 struct LightField {
   TexturedMesh base;
   bool adds_base = true;
@@ -154,6 +158,9 @@ class LUMIHULL_API LightFieldRenderer {
   std::vector<ByteScale> map_scales_;  // of each term
   std::vector<float> view_;            // vertices x nodes x terms
   std::vector<Eigen::Vector3f> normals_, mirrored_light_;  // of the vertices; of the sphere's nodes, linear. Or empty
+  std::vector<float> strength_;                            // of the vertices
+  Eigen::Vector3f mirrored_center_{0, 0, 0};
+  float mirrored_inverse_radius_ = 0;
 };
 
 }  // namespace lumihull::slf
