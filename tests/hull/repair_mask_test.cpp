@@ -1,5 +1,5 @@
 // What the other views contradict is decided anew: paper's colour on the object, sheets behind it, shadows.
-#include "repair_mask.h"
+#include "key/repair_mask.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "material.h"
-#include "noise.h"
+#include "objects/material.h"
+#include "objects/noise.h"
 #include "rig_support.h"
 
 namespace lumihull::rig {

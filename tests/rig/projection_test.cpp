@@ -8,7 +8,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "noise.h"
+#include "objects/noise.h"
 #include "rig_support.h"
 
 namespace lumihull::rig {

@@ -8,7 +8,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "repaint.h"
+#include "objects/repaint.h"
 #include "support.h"
 
 namespace lumihull::rig {

@@ -1,5 +1,5 @@
 // Cables through the picture.
-#include "thin_lines.h"
+#include "photograph/thin_lines.h"
 
 #include "rig_support.h"
 

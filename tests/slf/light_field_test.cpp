@@ -8,7 +8,7 @@
 #include <cmath>
 #include <memory>
 
-#include "sphere_grid.h"
+#include "fit/sphere_grid.h"
 #include "support.h"
 #include "synthetic.h"
 

@@ -5,9 +5,9 @@
 
 #include <functional>
 
-#include "judged_models.h"
+#include "judge/judged_models.h"
 #include "parts.h"
-#include "stage.h"
+#include "stages/stage.h"
 
 namespace lumihull::slf {
 namespace {
@@ -82,9 +82,10 @@ void compare_views(const Capture& capture, const fs::path& folder, const truth::
       options.pictures ? capture.folder() / "evaluate" / "test_views" : fs::path(), job);
   std::error_code ignored;
   if (out.views->highlights.empty())
-    out.left_out.push_back(without("highlights", fs::is_directory(folder / "test_views" / "highlights", ignored)
-                                                     ? "none that can be told from the paint is seen in two test views in a row"
-                                                     : "the truth has no test_views/highlights/"));
+    out.left_out.push_back(
+        without("highlights", fs::is_directory(folder / "test_views" / "highlights", ignored)
+                                  ? "none that can be told from the paint is seen in two test views in a row"
+                                  : "the truth has no test_views/highlights/"));
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 
 #include "mask_edges.h"
 #include "parts.h"
-#include "stage.h"
+#include "stages/stage.h"
 
 namespace lumihull::slf::truth {
 namespace {

@@ -7,9 +7,9 @@
 #include <cmath>
 
 #include "parts.h"
+#include "render/view_rays.h"
 #include "spread.h"
-#include "stage.h"
-#include "view_rays.h"
+#include "stages/stage.h"
 
 namespace lumihull::slf::truth {
 namespace {

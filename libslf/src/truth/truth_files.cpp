@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "stage.h"
+#include "stages/stage.h"
 
 namespace lumihull::slf::truth {
 namespace {

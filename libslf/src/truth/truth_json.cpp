@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "evaluation_json.h"
+#include "judge/evaluation_json.h"
 
 namespace lumihull::slf {
 namespace {

@@ -8,10 +8,10 @@
 #include <functional>
 #include <numeric>
 
-#include "html.h"
 #include "parts.h"
-#include "report_sections.h"
-#include "stage.h"
+#include "report/html.h"
+#include "report/report_sections.h"
+#include "stages/stage.h"
 
 namespace lumihull::slf {
 namespace {
