@@ -8,6 +8,7 @@
 
 #include "support.h"
 #include "synthetic.h"
+#include "wall_key.h"
 
 namespace lumihull::hull {
 namespace {
@@ -25,6 +26,7 @@ struct Scene {
   std::vector<Image> whole, photos;    ///< photographs, and the same thinned
   std::vector<Image> kinds, sheet_at;  ///< what they show; sheets' numbers, from 1
   std::vector<calib::CalibratedBody> sheets;
+  std::optional<calib::ColorKey> key;  ///< of walls, paper and ink
 
   Scene() {
     for (int k = 0; k < kSheets; ++k) sheets.push_back(sheet(k));
@@ -41,6 +43,15 @@ struct Scene {
       v.frame = {0, 0, v.mask.width(), v.mask.height()};
       views.push_back(std::move(v));
     }
+    std::vector<calib::Rgb> background;
+    for (std::size_t i = 0; i < photos.size(); ++i)
+      for (int y = 0; y < whole[i].height(); y += 3)
+        for (int x = 0; x < whole[i].width(); x += 3) {
+          const std::uint8_t* p = whole[i].row<std::uint8_t>(y) + 3 * x;
+          if (kinds[i].row<std::uint8_t>(y)[x] < kBall) background.push_back({p[0], p[1], p[2]});
+        }
+    Job job;
+    key = calib::ColorKey::train(background, {.foreground_share = 0.2}, job);
   }
 
   static const Scene& get() {
@@ -56,7 +67,7 @@ struct Scene {
                                   std::vector<std::uint8_t> fixed = {}) const {
     fixed.resize(from.size());
     Job job;
-    return MaskRepair::learn({from, std::span(photos).first(from.size()), fixed, solved, std::nullopt, 0}, job);
+    return MaskRepair::learn({from, std::span(photos).first(from.size()), fixed, solved, &*key, std::nullopt, 0}, job);
   }
 
   template <class Is>
@@ -182,8 +193,8 @@ TEST(RepairMask, PaperIsObjectOnTheObjectAndBackgroundOnSheets) {
   const Wrong w = mend(scene, learned(), all_keyed(scene));
   ASSERT_GT(w.inner, 20000);
   EXPECT_EQ(w.deep_hole, 0);
-  // Notches are left where the patch is at the outline: there the hull is hardly deep.
-  EXPECT_LT(w.hole, 0.2 * w.patch);
+  // Notches are left where the patch is at the outline before a sheet.
+  EXPECT_LT(w.hole, 0.1 * w.patch);
   ASSERT_GT(w.sheets, 50000);
   EXPECT_LT(w.extra, 0.002 * w.sheets);
   EXPECT_EQ(w.ball, 0);
@@ -210,7 +221,8 @@ TEST(RepairMask, SheetsThatWereNotSolvedAreBackgroundWhereTheOtherViewsSeeNoObje
   const auto repair = scene.learn(views, solved);
   ASSERT_TRUE(repair);
   const Wrong w = mend(scene, *repair, keyed);
-  EXPECT_LT(w.extra, 0.002 * w.sheets);
+  // Some of a sheet that nobody knows of is object where it meets the outline.
+  EXPECT_LT(w.extra, 0.01 * w.sheets);
   EXPECT_EQ(w.wall, 0);
   EXPECT_EQ(w.deep_hole, 0);
 }
@@ -258,16 +270,96 @@ TEST(RepairMask, NothingIsSaidByLessThanFiveViews) {
   EXPECT_TRUE(scene.learn(views.first(5), scene.sheets));
 }
 
+std::vector<Sheet> sheets_around() { return sheets_of(Scene::get().sheets, Vector3d(0, 0, 1)); }
+
+/// The ball, carved from its true masks.
+const CoarseHull& ball() {
+  static const auto hull = [] {
+    const Scene& scene = Scene::get();
+    std::vector<CoarseView> views = scene.views;
+    for (std::size_t i = 0; i < views.size(); ++i)
+      views[i].mask = Scene::thinned(Scene::where(scene.kinds[i], [](int k) { return k >= kBall; }));
+    Job job;
+    return CoarseHull::carve(views, 48, 0.1, job);
+  }();
+  if (!hull) throw Error(ErrorCode::degenerate, "the scene must have a hull");
+  return *hull;
+}
+
+TEST(Sheets, PaperIsMeasuredWhereItEnds) {
+  const Scene& scene = Scene::get();
+  std::vector<Sheet> sheets = sheets_around();
+  ASSERT_EQ(sheets.size(), std::size_t(kSheets));
+  Job job;
+  const auto paper = PaperColors::learn(sheets, scene.views, scene.photos, ball(), job);
+  ASSERT_TRUE(paper);
+  measure_paper(sheets, scene.views, scene.photos, ball(), *paper, job);
+  int measured = 0;
+  for (const Sheet& s : sheets)
+    for (const double reach : s.reach) {
+      EXPECT_GT(reach, kSheet / kPrinted - 0.01);
+      measured += reach < kSheet / kPrinted + 0.2;
+    }
+  EXPECT_GT(measured, 0.75 * 4 * kSheets) << "the ball hides some sides in nearly all views";
+}
+
+TEST(Sheets, WithoutViewsThatTellPaperMayReachFar) {
+  const Scene& scene = Scene::get();
+  std::vector<Sheet> sheets = sheets_around();
+  Job job;
+  const auto paper = PaperColors::learn(sheets, scene.views, scene.photos, ball(), job);
+  ASSERT_TRUE(paper);
+  measure_paper(sheets, {}, {}, ball(), *paper, job);
+  for (const Sheet& s : sheets)
+    for (const double reach : s.reach) EXPECT_EQ(reach, Sheet::kFarthest);
+}
+
+TEST(WallKey, KnowsNoPaperBesideSheets) {
+  const Scene& scene = Scene::get();
+  std::vector<Sheet> sheets = sheets_around();
+  for (Sheet& s : sheets) s.reach.fill(kSheet / kPrinted + 0.05);
+  Job job;
+  const auto key = key_beside_sheets(*scene.key, sheets, scene.views, scene.photos, ball(), job);
+  ASSERT_TRUE(key);
+  for (const calib::Rgb& sheet : {calib::Rgb{176, 190, 172}, calib::Rgb{28, 34, 30}, calib::Rgb{102, 112, 101}}) {
+    EXPECT_TRUE(key->is_object(sheet)) << int(sheet[0]);
+    if (sheet[0] != 102) {
+      EXPECT_FALSE(scene.key->is_object(sheet)) << int(sheet[0]);
+    }
+  }
+  for (const double light : {0.82, 0.9, 0.98}) {
+    const calib::Rgb wall{std::uint8_t(40 * light), std::uint8_t(120 * light), std::uint8_t(56 * light)};
+    EXPECT_FALSE(key->is_object(wall)) << light;
+  }
+
+  // On a picture of paper, half of it at a sheet's place: object is the other half; without edges, what is wide.
+  Image mask(24, 12, 1), photo(24, 12, 3), parts(12, 6, 1);
+  for (int y = 0; y < 12; ++y)
+    for (int x = 0; x < 24; ++x) {
+      const calib::Rgb c = x < 20    ? calib::Rgb{176, 190, 172}
+                           : x == 22 ? calib::Rgb{176, 190, 172}
+                                     : calib::Rgb{36, 108, 50};
+      std::copy(c.begin(), c.end(), photo.row<std::uint8_t>(y) + 3 * x);
+      if (x < 12) parts.row<std::uint8_t>(y / 2)[x / 2] = kPaperRim;
+    }
+  for (const bool edges : {true, false}) {
+    Image out = mask;
+    key_places(out, photo, parts, *key, edges);
+    for (int x = 0; x < 24; ++x)
+      EXPECT_EQ(out.row<std::uint8_t>(6)[x], (x >= 12 && x < 20) || (x == 22 && edges) ? 255 : 0) << x << ' ' << edges;
+  }
+}
+
 /// Whether a pixel that was keyed as object still is.
 bool stays(const calib::Rgb& color, const calib::Rgb& background) {
   Image mask(1, 1, 1), photo(1, 1, 3);
   mask.row<std::uint8_t>(0)[0] = 255;
   std::copy(color.begin(), color.end(), photo.row<std::uint8_t>(0));
-  take_shadows(mask, photo, background);
+  Shadows(background).take(mask, photo);
   return mask.row<std::uint8_t>(0)[0] == 255;
 }
 
-TEST(TakeShadows, TakesWhatIsDarkerAndMoreSaturatedThanTheEnclosure) {
+TEST(Shadows, TakesWhatIsDarkerAndMoreSaturatedThanTheEnclosure) {
   const calib::Rgb green{40, 120, 56}, blue{30, 50, 130};
   EXPECT_FALSE(stays({10, 60, 18}, green));
   EXPECT_FALSE(stays({2, 30, 4}, green));
@@ -282,7 +374,40 @@ TEST(TakeShadows, TakesWhatIsDarkerAndMoreSaturatedThanTheEnclosure) {
   EXPECT_TRUE(stays({1, 18, 2}, green)) << "too dark to have a hue";
 }
 
-TEST(TakeShadows, NothingBeforeAGreyOrBlackEnclosure) {
+TEST(Shadows, AreSureWhereTheyAreAsSaturatedAsTheBackgroundThatIsSoDark) {
+  // A green ground that gets darker and more saturated to the right; nothing is darker than a light of 50.
+  const Scene& scene = Scene::get();
+  std::vector<CoarseView> views(scene.views.begin(), scene.views.begin() + 2);
+  std::vector<Image> photos;
+  const auto ground = [](double light) {
+    const double green = 0.95 - 0.4 * light / 216;
+    return calib::Rgb{std::uint8_t((1 - green) * 0.4 * light), std::uint8_t(green * light),
+                      std::uint8_t((1 - green) * 0.6 * light)};
+  };
+  for (const CoarseView& v : views) {
+    Image photo(v.mask.width(), v.mask.height(), 3);
+    for (int y = 0; y < photo.height(); ++y)
+      for (int x = 0; x < photo.width(); ++x) {
+        const calib::Rgb c = ground(50 + 166.0 * x / photo.width());
+        std::copy(c.begin(), c.end(), photo.row<std::uint8_t>(y) + 3 * x);
+      }
+    photos.push_back(std::move(photo));
+  }
+  Shadows shadows({40, 120, 56});
+  const calib::Rgb deep = ground(60), deeper{0, 19, 1}, brown{8, 31, 11}, black{4, 12, 4};
+  EXPECT_FALSE(shadows.is_sure(deep.data())) << "before anything was seen";
+  EXPECT_FALSE(shadows.may_be(deeper.data())) << "too dark to be taken unseen";
+  Job job;
+  shadows.learn(views, photos, ball(), job);
+  EXPECT_TRUE(shadows.is_sure(deep.data()));
+  EXPECT_TRUE(shadows.is_sure(deeper.data())) << "darker than all that was seen, and as saturated";
+  EXPECT_TRUE(shadows.may_be(deeper.data()));
+  EXPECT_TRUE(shadows.may_be(brown.data())) << "more saturated than the enclosure";
+  EXPECT_FALSE(shadows.is_sure(brown.data())) << "but less than what is so dark";
+  EXPECT_FALSE(shadows.may_be(black.data()));
+}
+
+TEST(Shadows, NothingBeforeAGreyOrBlackEnclosure) {
   for (const calib::Rgb& background : {calib::Rgb{120, 120, 120}, calib::Rgb{118, 126, 116}, calib::Rgb{0, 0, 0}})
     for (const calib::Rgb& color : {calib::Rgb{10, 60, 18}, calib::Rgb{0, 90, 0}, calib::Rgb{30, 30, 30}})
       EXPECT_TRUE(stays(color, background));

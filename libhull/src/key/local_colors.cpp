@@ -32,7 +32,8 @@ constexpr float kAgree = 3;      // log odds that a neighbour of the same colour
 constexpr float kSigma = 12;     // levels by which neighbours' colours may differ
 constexpr int kFarthest = 2048;  // squared difference of colours beyond which neighbours do not count
 
-enum Kind : std::uint8_t { kNeither, kObject, kWall, kOnSheet };
+/// kPaperLike: object in a colour of the sheets' paper.
+enum Kind : std::uint8_t { kNeither, kObject, kPaperLike, kWall, kOnSheet };
 
 /// How often colours occur among samples, each counted in its bin and, less, in those around it.
 class ColorCounts {
@@ -91,7 +92,7 @@ struct Samples {
 };
 
 Samples sample(const Image& mask, const Image& photo, const CoarseView& view, const Image& depth, const Image& near,
-               const Image* parts) {
+               const Clues& clues) {
   const int width = depth.width(), height = depth.height(), pixels = mask.width() / width;
   const auto object = [&](int x, int y) {
     return mask.row<std::uint8_t>(y * pixels + pixels / 2)[x * pixels + pixels / 2] >= 128;
@@ -101,12 +102,13 @@ Samples sample(const Image& mask, const Image& photo, const CoarseView& view, co
   for (int y = std::max(1, view.frame.y0); y < std::min(height - 1, view.frame.y1); ++y)
     for (int x = std::max(1, view.frame.x0); x < std::min(width - 1, view.frame.x1); ++x) {
       const std::size_t i = std::size_t(y) * std::size_t(width) + std::size_t(x);
-      out.bins[i] = ColorCounts::bin(photo.row<std::uint8_t>(y * pixels + pixels / 2) + 3 * (x * pixels + pixels / 2));
+      const std::uint8_t* p = photo.row<std::uint8_t>(y * pixels + pixels / 2) + 3 * (x * pixels + pixels / 2);
+      out.bins[i] = ColorCounts::bin(p);
       if (!near.row<std::uint8_t>(y)[x])
-        out.kinds[i] = parts && parts->row<std::uint8_t>(y)[x] != kNoSheet ? kOnSheet : kWall;
+        out.kinds[i] = clues.sheet_parts && clues.sheet_parts->row<std::uint8_t>(y)[x] != kNoSheet ? kOnSheet : kWall;
       else if (depth.row<std::uint8_t>(y)[x] && object(x, y) && object(x - 1, y) && object(x + 1, y) &&
                object(x, y - 1) && object(x, y + 1))
-        out.kinds[i] = kObject;
+        out.kinds[i] = clues.paper && clues.paper->is_paper(p) ? kPaperLike : kObject;
     }
   return out;
 }
@@ -177,15 +179,15 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
                 mask.row<std::uint8_t>(y * pixels + pixels / 2)[x * pixels + pixels / 2] < 128;
     if (double(sure) < std::max(4.0, kLeastSure * width * height)) return 0;
   }
-  const Samples samples =
-      sample(mask, photo, view, depth, wide.silhouette(view, hull.margin_px(view)), clues.sheet_parts);
-  ColorCounts all_object, all_wall, all_sheet, object, wall, sheet;
+  const Samples samples = sample(mask, photo, view, depth, wide.silhouette(view, hull.margin_px(view)), clues);
+  ColorCounts all_object, all_paper_like, all_wall, all_sheet, object, paper_like, wall, sheet;
   for (std::size_t i = 0; i < samples.kinds.size(); ++i) {
     if (samples.kinds[i] == kObject) all_object.add(samples.bins[i]);
+    if (samples.kinds[i] == kPaperLike) all_paper_like.add(samples.bins[i]);
     if (samples.kinds[i] == kWall) all_wall.add(samples.bins[i]);
     if (samples.kinds[i] == kOnSheet) all_sheet.add(samples.bins[i]);
   }
-  all_object.smooth(), all_wall.smooth(), all_sheet.smooth();
+  all_object.smooth(), all_paper_like.smooth(), all_wall.smooth(), all_sheet.smooth();
   std::vector<Open> open;
   std::size_t were_object = 0;
   for (int y0 = 0; y0 < height; y0 += kTile)
@@ -205,19 +207,23 @@ std::size_t decide_by_surroundings(Image& mask, const Image& photo, const Coarse
               if (is ? deep > 0 || least > 0 : !may_be || (least > 0 && deep == 0)) continue;
               if (!learned) {
                 learned = true;
-                object.clear(), wall.clear(), sheet.clear();
+                object.clear(), paper_like.clear(), wall.clear(), sheet.clear();
                 for (int t = std::max(0, y0 - kTile); t < std::min(height, y1 + kTile); ++t)
                   for (int s = std::max(0, x0 - kTile); s < std::min(width, x1 + kTile); ++s) {
                     const std::size_t i = std::size_t(t) * std::size_t(width) + std::size_t(s);
                     if (samples.kinds[i] == kObject) object.add(samples.bins[i]);
+                    if (samples.kinds[i] == kPaperLike) paper_like.add(samples.bins[i]);
                     if (samples.kinds[i] == kWall) wall.add(samples.bins[i]);
                     if (samples.kinds[i] == kOnSheet) sheet.add(samples.bins[i]);
                   }
-                object.smooth(), wall.smooth(), sheet.smooth();
+                object.smooth(), paper_like.smooth(), wall.smooth(), sheet.smooth();
               }
               const std::uint32_t color = ColorCounts::bin(p);
-              float odds =
-                  object.share(color) + kAnywhere * all_object.share(color) + (deep > 1 ? kUnknown : kUnknownAtRim);
+              // On sheets a paper-coloured object can't be told from paper: what is like paper proves nothing there.
+              const float of_object =
+                  no_sheet ? object.share(color, paper_like) + kAnywhere * all_object.share(color, all_paper_like)
+                           : object.share(color) + kAnywhere * all_object.share(color);
+              float odds = of_object + (deep > 1 ? kUnknown : kUnknownAtRim);
               if (std::min({p[0], p[1], p[2]}) >= kClipped) odds += kShine;
               odds /= kUnknown + (no_sheet ? wall.share(color) + kAnywhere * all_wall.share(color)
                                            : wall.share(color, sheet) + kAnywhere * all_wall.share(color, all_sheet));
