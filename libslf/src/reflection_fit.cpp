@@ -15,10 +15,10 @@ using Eigen::Vector3f;
 using Light = std::vector<Vector3f>;
 
 constexpr std::size_t kChunks = 64;
-constexpr int kRounds = 4, kSteps = 12;          // of E and s by turns; of conjugate gradients on E in each
-constexpr int kTrialRounds = 2, kTrialSteps = 8;  // where a comparison is all that is wanted
+constexpr int kRounds = 4, kSteps = 12;                      // of E and s by turns; of conjugate gradients on E in each
+constexpr int kTrialRounds = 2, kTrialSteps = 8;             // where a comparison is all that is wanted
 constexpr float kSmoothness = 0.02f, kTowardsZero = 0.002f;  // in shares of a node's mean weight
-constexpr float kStrengthTowardsOne = 0.1f;                    // in shares of a vertex's mean weight
+constexpr float kStrengthTowardsOne = 0.1f;                  // in shares of a vertex's mean weight
 // About so many samples are enough: all places share what is looked for.
 constexpr std::size_t kSamples = 600'000, kTrialSamples = 150'000;
 constexpr std::uint8_t kWhite = 253;
@@ -168,8 +168,7 @@ void raise_white(std::vector<Look>& looks, float strength) {
   for (int c = 0; c < 3; ++c) {
     float own = 0, weight = 0;
     for (const Look& l : looks)
-      if (!l.white[std::size_t(c)])
-        own += l.weight * (l.color[c] - strength * l.mirrored_light[c]), weight += l.weight;
+      if (!l.white[std::size_t(c)]) own += l.weight * (l.color[c] - strength * l.mirrored_light[c]), weight += l.weight;
     if (!(weight > 0)) continue;
     own /= weight;
     for (Look& l : looks)
@@ -247,8 +246,7 @@ void improve_light(const Fit& fit, Model& model, std::uint8_t left_out, int step
     fit.for_each(job, fit.expanded(v), left_out, [&](std::size_t chunk, std::size_t spot, std::vector<Look>& looks) {
       const float s = fit.strength(model.strength, spot);
       const Vector3f middle = mean(looks, [](const Look& l) { return l.mirrored_light; });
-      for (const Look& l : looks)
-        fit.spread(parts[chunk], l.place, s * s * l.weight * (l.mirrored_light - middle));
+      for (const Look& l : looks) fit.spread(parts[chunk], l.place, s * s * l.weight * (l.mirrored_light - middle));
     });
     Light product = sum_of(parts, size);
     add_smoothness(fit.grid(), v, node_weight, product);
@@ -307,30 +305,34 @@ void improve_strength(const Fit& fit, Model& model, std::uint8_t left_out, Job& 
   const double pull = double(kStrengthTowardsOne) * total / double(vertices);
   if (!(pull > 0)) return;
   for (std::size_t v = 0; v < vertices; ++v)
-    model.strength[v] = float(std::clamp((with_around[v] + pull) / (square_around[v] + pull), 0.0, double(kMostStrength)));
+    model.strength[v] =
+        float(std::clamp((with_around[v] + pull) / (square_around[v] + pull), 0.0, double(kMostStrength)));
 }
 
 struct Explained {
   double before = 0, after = 0, weight = 0;
 };
 
-/// At the samples of a fold, with each texel's own colour from the others.
+/// An sRGB colour.
+Vector3f shown(const Vector3f& light) {
+  return light.unaryExpr([](float v) { return srgb_from_linear(std::clamp(v, 0.0f, 1.0f)); });
+}
+
+/// At the samples of a fold, with each texel's own colour from the others: squared errors in sRGB, of the mean colour
+/// alone and with what is mirrored.
 Explained explained(const Fit& fit, const Model& model, std::uint8_t fold, Job& job) {
   std::vector<Explained> sums(kChunks);
   const Light light = fit.expanded(model.light);
   fit.for_each(job, light, fold, [&](std::size_t chunk, std::size_t spot, std::vector<Look>& looks) {
     const float s = fit.strength(model.strength, spot);
-    const Vector3f alone = mean(looks, [](const Look& l) { return l.color; });
+    const Vector3f alone = mean(looks, [](const Look& l) { return shown(l.color); });
     raise_white(looks, s);
     const Vector3f own = mean(looks, [&](const Look& l) -> Vector3f { return l.color - s * l.mirrored_light; });
     for (const Look& l : fit.looks(spot)) {
       if (l.fold != fold) continue;
-      const Vector3f m = own + s * mirrored_light(light, l.place);
-      Vector3f c = l.color;
-      sums[chunk].before += double(l.weight * (c - alone).squaredNorm());
-      for (int k = 0; k < 3; ++k)
-        if (l.white[std::size_t(k)]) c[k] = std::max(c[k], m[k]);
-      sums[chunk].after += double(l.weight * (c - m).squaredNorm());
+      const Vector3f seen = shown(l.color);
+      sums[chunk].before += double(l.weight * (seen - alone).squaredNorm());
+      sums[chunk].after += double(l.weight * (seen - shown(own + s * mirrored_light(light, l.place))).squaredNorm());
       sums[chunk].weight += double(l.weight);
     }
   });
@@ -374,6 +376,16 @@ Surroundings surroundings(Fit& fit, Job& job) {
   return best;
 }
 
+/// What a texel mirrors to an eye, linear light.
+Vector3f mirrored_at(const ReflectionFit& reflection, const hull::Mesh& mesh, const Texel& texel, const Vector3f& eye) {
+  const auto& t = mesh.triangles[texel.triangle];
+  const float strength = (1 - texel.b1 - texel.b2) * reflection.strength[t[0]] + texel.b1 * reflection.strength[t[1]] +
+                         texel.b2 * reflection.strength[t[2]];
+  return strength *
+         mirrored_light(reflection.light, mirror_place(SphereGrid(kReflectionSide), reflection.around, mesh,
+                                                       reflection.normals, texel.triangle, texel.b1, texel.b2, eye));
+}
+
 }  // namespace
 
 ReflectionFit fit_reflection(const hull::Mesh& mesh, const Atlas& atlas, std::span<const PhotoSamples> photos,
@@ -405,15 +417,6 @@ ReflectionFit fit_reflection(const hull::Mesh& mesh, const Atlas& atlas, std::sp
   job.advance();
   job.end();
   return out;
-}
-
-Vector3f mirrored_at(const ReflectionFit& reflection, const hull::Mesh& mesh, const Texel& texel, const Vector3f& eye) {
-  const auto& t = mesh.triangles[texel.triangle];
-  const float strength = (1 - texel.b1 - texel.b2) * reflection.strength[t[0]] +
-                         texel.b1 * reflection.strength[t[1]] + texel.b2 * reflection.strength[t[2]];
-  return strength * mirrored_light(reflection.light,
-                                   mirror_place(SphereGrid(kReflectionSide), reflection.around, mesh,
-                                                reflection.normals, texel.triangle, texel.b1, texel.b2, eye));
 }
 
 void take_off(const ReflectionFit& reflection, const hull::Mesh& mesh, const Atlas& atlas,

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "render_with.h"
 #include "mirror.h"
+#include "render_with.h"
 #include "view_nodes.h"
 
 #ifdef __AVX2__
@@ -193,8 +193,8 @@ Rendering LightFieldRenderer::render(const View& view, const RenderOptions& opti
   const Eigen::Vector3f eye = view.center().cast<float>();
   const auto mirror = [&](const SurfaceSample& s, float* color) {
     const auto& t = mesh_.triangles[s.hit.triangle];
-    const float strength = (1 - s.hit.b1 - s.hit.b2) * strength_[t[0]] + s.hit.b1 * strength_[t[1]] +
-                           s.hit.b2 * strength_[t[2]];
+    const float strength =
+        (1 - s.hit.b1 - s.hit.b2) * strength_[t[0]] + s.hit.b1 * strength_[t[1]] + s.hit.b2 * strength_[t[2]];
     const Eigen::Vector3f light =
         strength * mirrored_light(mirrored_light_, mirror_place(sphere, around, mesh_, normals_, s.hit.triangle,
                                                                 s.hit.b1, s.hit.b2, eye));
