@@ -8,7 +8,7 @@
 
 #include "support.h"
 #include "synthetic.h"
-#include "wall_key.h"
+#include "key/wall_key.h"
 
 namespace lumihull::hull {
 namespace {

@@ -150,6 +150,32 @@ TEST(HighlightJudge, WhatThePhotographsDoNotShowIsNotAsked) {
   EXPECT_TRUE(nothing.paths().empty());
 }
 
+TEST(HighlightJudge, WhatPaintCouldFakeIsNotAsked) {
+  // On stripes of 6 px: a picture that is off by a pixel differs by more than a faint highlight.
+  const auto striped = [](int i, double strength) {
+    Image image = picture(i, {});
+    const Image gloss = picture(i, {{first(i), strength}, {second(i), strength}}, true);
+    for (int y = 0; y < image.height(); ++y)
+      for (int x = 0; x < 3 * image.width(); ++x) {
+        const float light =
+            linear_from_srgb(unit_of_srgb8(gloss.row<std::uint8_t>(y)[x])) + ((x / 3 + y) / 6 % 2 ? 0.15f : 0.4f);
+        image.row<std::uint8_t>(y)[x] = std::uint8_t(std::lround(255 * srgb_from_linear(std::min(light, 1.0f))));
+      }
+    return image;
+  };
+  for (const double strength : {0.05, 0.5}) {
+    slf::HighlightJudge judge(wall());
+    for (int i = 0; i < kViews; ++i)
+      judge.add_view(view(i), striped(i, 0), picture(i, {{first(i), strength}, {second(i), strength}}, true),
+                     striped(i, strength));
+    const auto paths = judge.paths();
+    if (strength < 0.1)
+      EXPECT_TRUE(paths.empty());
+    else
+      EXPECT_EQ(paths.at("photograph").tracks, 2u);
+  }
+}
+
 TEST(HighlightJudge, SaysWhatItNeeds) {
   slf::HighlightJudge judge(wall());
   const auto refused = [](const std::function<void()>& act) {

@@ -35,7 +35,11 @@ slf::LightField made_up(bool slots) {
   field.nodes = {{1, 2, 3}, {-4, 5, 6}, {7, -8, 9}};
   if (!slots) {
     auto& r = field.reflection.emplace();
-    for (const auto& v : field.base.mesh.vertices) r.normals.push_back(v.normalized());
+    for (const auto& v : field.base.mesh.vertices) {
+      r.normals.push_back(v.normalized());
+      r.strength.push_back(std::uint8_t(random() % 256));
+    }
+    r.center = {0.25f, -0.5f, 0.125f}, r.inverse_radius = 0.0625f, r.strength_scale = {3, 0.5f};
     r.light = r.grazing = Image(5, 5, 3);
     for (std::size_t i = 0; i < r.light.bytes(); ++i)
       r.light.data()[i] = std::byte(random() % 256), r.grazing.data()[i] = std::byte(random() % 256);
@@ -130,6 +134,10 @@ TEST(LightFieldGlb, ComesBackAsItWas) {
     if (!slots) {
       expect_equal(back.reflection->light, field.reflection->light);
       expect_equal(back.reflection->grazing, field.reflection->grazing);
+      EXPECT_EQ(back.reflection->strength, field.reflection->strength);
+      EXPECT_EQ(back.reflection->strength_scale.scale, field.reflection->strength_scale.scale);
+      EXPECT_EQ(back.reflection->center, field.reflection->center);
+      EXPECT_EQ(back.reflection->inverse_radius, field.reflection->inverse_radius);
       EXPECT_EQ(back.reflection->light_scale.offset, field.reflection->light_scale.offset);
       EXPECT_EQ(back.reflection->grazing_scale.scale, field.reflection->grazing_scale.scale);
       for (std::size_t v = 0; v < back.reflection->normals.size(); ++v)  // three bytes each
@@ -350,7 +358,22 @@ TEST(LightFieldGlb, WrongReflectionsAreNamed) {
   expect_refused("square", [](json& r) { r["light"] = 0, r["grazing"] = 0; });
   expect_refused("expected 5 x 5", [](json& r) { r["grazing"] = 0; });
   expect_refused("\"light\"", [](json& r) { r.erase("light"); });
+  expect_refused("reflection/strength", [](json& r) { r["strength"] = 0; });
+  expect_refused("reflection/center", [](json& r) { r["center"] = {1, 2}; });
+  expect_refused("inverseRadius", [](json& r) { r["inverseRadius"] = -1; });
+  expect_refused("does not hold all vertices", [](json& r) { r["inverseRadius"] = 1000; });
   expect_refused("grazingScale/scale", [](json& r) { r["grazingScale"]["scale"] = 1e9; });
+
+  // Version 2 knew one strength and lamps far away only.
+  Parts old = parts_of(good);
+  json& extension = extension_of(old.document);
+  ASSERT_EQ(extension["version"], 3);
+  extension["version"] = 2;
+  for (const char* key : {"strength", "strengthScale", "center", "inverseRadius"}) extension["reflection"].erase(key);
+  const slf::LightField before = slf::decode_light_field(joined(old), "old.glb");
+  EXPECT_EQ(before.reflection->inverse_radius, 0);
+  for (const std::uint8_t s : before.reflection->strength)
+    EXPECT_EQ(before.reflection->strength_scale.scale * float(s) / 255 + before.reflection->strength_scale.offset, 1);
 
   slf::LightField field = made_up(false);
   field.reflection->normals[3] *= 2;

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <memory>
 
-#include "fit/sphere_grid.h"
+#include "fit/mirror.h"
 #include "support.h"
 #include "synthetic.h"
 
@@ -203,9 +203,50 @@ TEST(LightField, LeavesOutReflectionsWhereThereAreNone) {
       test::around(8, 2, 4, test::camera(120, 90, 150)));
   slf::LightFieldOptions options;
   options.edge_alpha = test::kNoTrace;
-  options.terms = 0;
   Job job;
-  EXPECT_FALSE(slf::fit_light_field(ball, photos, options, job).reflection);
+  for (const int terms : {0, 2}) {
+    options.terms = terms;
+    EXPECT_FALSE(slf::fit_light_field(ball, photos, options, job).reflection) << terms;
+  }
+}
+
+TEST(LightField, NearLampsAndSeveralMaterialsAreMirrored) {
+  // A lamp 3 from the middle of a ball of radius 1, of which one half mirrors a quarter as much as the other.
+  const hull::Mesh ball = test::sphere(24);
+  const Eigen::Vector3f lamp = 3 * Eigen::Vector3f(1, 0.3f, 0.8f).normalized();
+  const auto paint = [bands = test::bands(), lamp](const Eigen::Vector3f& p, const Eigen::Vector3f& eye) {
+    const Eigen::Vector3f r = slf::mirrored((eye - p).normalized(), p.normalized());
+    const float c = std::max(0.0f, r.dot((lamp - p).normalized())), most = p.y() > 0 ? 0.4f : 0.1f;
+    return Eigen::Vector3f((0.6f * bands(p) / 255).unaryExpr([&](float v) {
+      return 255 * srgb_from_linear(std::min(1.0f, linear_from_srgb(v) + most * std::pow(c, 30.0f)));
+    }));
+  };
+  slf::LightFieldOptions options;
+  options.edge_alpha = test::kNoTrace;
+  options.terms = 0, options.texel_px = 1;
+  Job job;
+  const auto photos = photographs_of(ball, paint, test::around(10, 4, 4, test::camera(160, 120, 200)));
+  const auto field = slf::fit_light_field(ball, photos, options, job);
+  ASSERT_TRUE(field.reflection);
+  const slf::LightFieldReflection& r = *field.reflection;
+  EXPECT_NEAR(r.inverse_radius, 1.0f / 3, 0.12f);
+  double sum[2] = {0, 0}, count[2] = {0, 0};
+  for (std::size_t v = 0; v < ball.vertices.size(); ++v) {
+    const Eigen::Vector3f& p = ball.vertices[v];
+    if (p.x() < 0.2f || std::abs(p.y()) < 0.2f) continue;  // the lamp's side
+    sum[p.y() > 0] += double(r.strength[v]), ++count[p.y() > 0];
+  }
+  EXPECT_GT(sum[1] / count[1], 2 * sum[0] / count[0]);
+}
+
+TEST(Mirror, RaysMeetTheSphereAroundTheObject) {
+  const Eigen::Vector3f point(0.5f, -1, 0.25f), ray = Eigen::Vector3f(1, 2, -2) / 3;
+  EXPECT_EQ(slf::met({{7, 8, 9}, 0}, point, ray), ray);
+  const slf::Surroundings around{{0.25f, 0, 0}, 0.2f};
+  const Eigen::Vector3f there = around.center + 5 * slf::met(around, point, ray), way = there - point;
+  EXPECT_NEAR((there - around.center).norm(), 5, 1e-5);
+  EXPECT_GT(way.dot(ray), 0);
+  EXPECT_LT(way.cross(ray).norm(), 1e-5);
 }
 
 TEST(SphereGrid, HasNoSeam) {
@@ -351,6 +392,18 @@ TEST(LightField, ChoosesNodesAmongManyPhotographs) {
   EXPECT_EQ(all.nodes.size(), 36u);
   EXPECT_GT(mean_psnr(all, seen), mean_psnr(field, seen));
   EXPECT_GT(mean_psnr(field, seen), mean_psnr(field, seen, 0) + 1);
+  // The others do no harm to what those at the nodes alone would say.
+  slf::PhotoSet few;
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    for (const auto& node : field.nodes)
+      if (node == seen.views[i].center().cast<float>())
+        few.names.push_back(seen.names[i]), few.views.push_back(seen.views[i]);
+  ASSERT_EQ(few.size(), 12u);
+  few.read = [&](std::size_t i) { return seen.read(std::size_t(std::stoi(few.names[i].substr(5)))); };
+  const slf::LightField without = slf::fit_light_field(mesh, few, {.terms = 3}, job);
+  const slf::PhotoSet fresh = photographs_of(mesh, glossy(), new_views());
+  EXPECT_GT(mean_psnr(field, fresh), mean_psnr(without, fresh) - 0.05);
+  EXPECT_GT(mean_psnr(field, seen), mean_psnr(without, seen));
 }
 
 TEST(LightField, SaysWhatItNeeds) {

@@ -69,12 +69,12 @@ JointFactors JointFit::run(Job& job) {
   return std::move(factors_);
 }
 
-double JointFit::left_out(const ReflectionFit* reflection, Job& job) {
-  job.begin("factors on trial", std::uint64_t(kTrialIterations));
-  reflection_ = reflection;
-  alternate(std::min(kTrialIterations, options_.iterations), job);
+double JointFit::held(Job& job) {
+  const int iterations = std::min(kTrialIterations, options_.iterations);
+  job.begin("factors on trial", std::uint64_t(iterations));
+  alternate(iterations, job);
   job.end();
-  return left_out_;
+  return held_;
 }
 
 /// Surface maps and view maps by turns, and in the end which terms hold.

@@ -12,7 +12,6 @@
 
 #include "atlas/atlas.h"
 #include "atlas/surface_samples.h"
-#include "reflection_fit.h"
 #include "texel_fit.h"
 #include "view_nodes.h"
 
@@ -48,10 +47,9 @@ class JointFit {
 
   JointFactors run(Job& job);
 
-  /// Root mean square at samples of photographs that had no part in the fit, in colours as they are shown: with the
-  /// terms, or with the mean colour alone where that is less. Needs terms. reflection: what was taken off the samples;
-  /// null: nothing. For comparisons: fewer turns than run makes.
-  double left_out(const ReflectionFit* reflection, Job& job);
+  /// Of the variance about each texel's mean colour, at photographs that had no part in the fit, the share that the
+  /// terms explain. For comparisons: fewer turns than run makes.
+  double held(Job& job);
 
   /// How many terms, the first ones, hold at photographs that had no part in them; the others are zero.
   std::size_t kept() const {
@@ -100,8 +98,7 @@ class JointFit {
   std::vector<std::vector<float>> views_;               // photographs x vertices x terms: view maps at the photographs
   std::vector<std::vector<float>> trust_;               // photographs x vertices: the weight behind them
   std::vector<float> share_;                            // of each term, see cross_validate; empty before
-  const ReflectionFit* reflection_ = nullptr;           // where colours as they are shown are asked for
-  double left_out_ = 0;
+  double held_ = 0;                                     // see held
   JointFactors factors_;
 };
 

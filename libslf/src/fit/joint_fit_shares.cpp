@@ -1,9 +1,7 @@
-#include <lumihull/base/image.h>
 #include <lumihull/base/parallel.h>
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "joint_fit.h"
 
@@ -22,13 +20,6 @@ Eigen::VectorXd bounded_least_squares(const Eigen::MatrixXd& normal, const Eigen
     for (Eigen::Index i = 0; i < s.size(); ++i)
       if (normal(i, i) > 0) s[i] = std::clamp(s[i] + (right[i] - normal.row(i).dot(s)) / normal(i, i), 0.0, 1.0);
   return s;
-}
-
-/// An sRGB colour with what is mirrored on top, linear light.
-Eigen::Vector3f shown(const Eigen::Vector3f& color, const Eigen::Vector3f& mirrored) {
-  if (mirrored.isZero(0)) return color;
-  return (color.unaryExpr([](float c) { return linear_from_srgb(std::clamp(c, 0.0f, 1.0f)); }) + mirrored)
-      .unaryExpr([](float light) { return srgb_from_linear(std::clamp(light, 0.0f, 1.0f)); });
 }
 
 }  // namespace
@@ -61,7 +52,7 @@ void JointFit::cross_validate(Job& job) {
   std::vector<Eigen::MatrixXd> normals(chunks, Eigen::MatrixXd::Zero(k, k));
   std::vector<Eigen::VectorXd> rights(chunks, Eigen::VectorXd::Zero(k));
   std::vector<double> weights(chunks, 0);
-  std::vector<std::array<double, 2>> errors(chunks, {0, 0});  // of the mean colour, of all terms
+  std::vector<double> squares(chunks, 0);
   parallel_for(job, chunks, [&](std::size_t chunk) {
     TexelFit fit(terms_, options_.surface_ridge);
     std::vector<float> means, surfaces, view(terms_);
@@ -91,12 +82,7 @@ void JointFit::cross_validate(Job& job) {
             normals[chunk] += (w * (part.transpose() * part)).cast<double>();
             rights[chunk] += (w * (part.transpose() * left)).cast<double>();
             weights[chunk] += 3.0 * w;
-            Eigen::Vector3f off = Eigen::Vector3f::Zero();
-            if (reflection_) off = mirrored_at(*reflection_, mesh_, atlas_.texels[begin + i], photos_[p].center);
-            const Eigen::Vector3f sample = Eigen::Map<const Eigen::Vector3f>(c.data()), own = sample - left;
-            const Eigen::Vector3f seen = shown(sample, off);
-            errors[chunk][0] += double(w * (seen - shown(own, off)).squaredNorm());
-            errors[chunk][1] += double(w * (seen - shown(own + part.rowwise().sum(), off)).squaredNorm());
+            squares[chunk] += double(w * left.squaredNorm());
           }
         }
       }
@@ -104,11 +90,11 @@ void JointFit::cross_validate(Job& job) {
   });
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(k, k);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(k);
-  double weight = 0, of_mean = 0, of_terms = 0;
-  for (const auto& e : errors) of_mean += e[0], of_terms += e[1];
-  for (std::size_t i = 0; i < chunks; ++i) normal += normals[i], right += rights[i], weight += weights[i];
-  left_out_ = weight > 0 ? std::sqrt(std::min(of_mean, of_terms) / weight) : 0;
+  double weight = 0, square = 0;
+  for (std::size_t i = 0; i < chunks; ++i)
+    normal += normals[i], right += rights[i], weight += weights[i], square += squares[i];
   const Eigen::VectorXd s = bounded_least_squares(normal, right);
+  held_ = square > 0 ? (2 * right.dot(s) - s.dot(normal * s)) / square : 0;
   share_.clear();
   for (std::ptrdiff_t i = 0; i < k; ++i) {
     const bool visible = s[i] * s[i] * normal(i, i) >= kVisible * kVisible * weight;

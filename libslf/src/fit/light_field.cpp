@@ -84,24 +84,13 @@ std::vector<std::uint32_t> photos_at_nodes(const hull::Mesh& mesh, std::span<con
   return choose_nodes(places, box.center(), most);
 }
 
-/// Whether photographs that had no part in the fit are met better with the reflection than without it, terms included
-/// both times; by those at the nodes.
-bool lowers_error(const ReflectionFit& reflection, const hull::Mesh& mesh, const Atlas& atlas,
-                  std::span<const PhotoSamples> samples, std::span<const std::uint32_t> at_node,
-                  const JointFitOptions& options, Job& job) {
+/// Whether a reflection is worth it: photographs that had no part in the fit are met better with it than with the mean
+/// colour alone, and better than the terms meet them without it.
+bool holds(const ReflectionFit& reflection, const hull::Mesh& mesh, const Atlas& atlas,
+           std::span<const PhotoSamples> samples, std::span<const Eigen::Vector3f> nodes,
+           std::span<const std::uint32_t> at_node, const JointFitOptions& options, Job& job) {
   if (!(reflection.held > 0 && reflection.held_rms > kLeastMirrored)) return false;
-  if (options.terms == 0) return true;
-  std::vector<PhotoSamples> trial;
-  std::vector<Eigen::Vector3f> nodes;
-  std::vector<std::uint32_t> all;
-  for (const std::uint32_t i : at_node) {
-    all.push_back(std::uint32_t(trial.size()));
-    nodes.push_back(samples[i].center);
-    trial.push_back(samples[i]);
-  }
-  const double without = JointFit(mesh, atlas, trial, nodes, all, options).left_out(nullptr, job);
-  take_off(reflection, mesh, atlas, trial, job);
-  return JointFit(mesh, atlas, trial, nodes, all, options).left_out(&reflection, job) < without;
+  return options.terms == 0 || reflection.held > JointFit(mesh, atlas, samples, nodes, at_node, options).held(job);
 }
 
 }  // namespace
@@ -200,7 +189,7 @@ LightField fit_light_field(const hull::Mesh& mesh, const PhotoSet& photos, const
   if (joint && options.reflections) {
     const ReflectionFit reflection = fit_reflection(mesh, atlas, samples, job);
     reflection_share = reflection.held;
-    if (lowers_error(reflection, mesh, atlas, samples, at_node, fit_options, job)) {
+    if (holds(reflection, mesh, atlas, samples, field.nodes, at_node, fit_options, job)) {
       take_off(reflection, mesh, atlas, samples, job);
       field.reflection = reflection_of(reflection);
     }

@@ -313,23 +313,26 @@ struct Explained {
   double before = 0, after = 0, weight = 0;
 };
 
-/// At the samples of a fold, with each texel's own colour from the others.
+/// An sRGB colour.
+Vector3f shown(const Vector3f& light) {
+  return light.unaryExpr([](float v) { return srgb_from_linear(std::clamp(v, 0.0f, 1.0f)); });
+}
+
+/// At the samples of a fold, with each texel's own colour from the others: squared errors in sRGB, of the mean colour
+/// alone and with what is mirrored.
 Explained explained(const Fit& fit, const Model& model, std::uint8_t fold, Job& job) {
   std::vector<Explained> sums(kChunks);
   const Light light = fit.expanded(model.light);
   fit.for_each(job, light, fold, [&](std::size_t chunk, std::size_t spot, std::vector<Look>& looks) {
     const float s = fit.strength(model.strength, spot);
-    const Vector3f alone = mean(looks, [](const Look& l) { return l.color; });
+    const Vector3f alone = mean(looks, [](const Look& l) { return shown(l.color); });
     raise_white(looks, s);
     const Vector3f own = mean(looks, [&](const Look& l) -> Vector3f { return l.color - s * l.mirrored_light; });
     for (const Look& l : fit.looks(spot)) {
       if (l.fold != fold) continue;
-      const Vector3f m = own + s * mirrored_light(light, l.place);
-      Vector3f c = l.color;
-      sums[chunk].before += double(l.weight * (c - alone).squaredNorm());
-      for (int k = 0; k < 3; ++k)
-        if (l.white[std::size_t(k)]) c[k] = std::max(c[k], m[k]);
-      sums[chunk].after += double(l.weight * (c - m).squaredNorm());
+      const Vector3f seen = shown(l.color);
+      sums[chunk].before += double(l.weight * (seen - alone).squaredNorm());
+      sums[chunk].after += double(l.weight * (seen - shown(own + s * mirrored_light(light, l.place))).squaredNorm());
       sums[chunk].weight += double(l.weight);
     }
   });
@@ -373,6 +376,16 @@ Surroundings surroundings(Fit& fit, Job& job) {
   return best;
 }
 
+/// What a texel mirrors to an eye, linear light.
+Vector3f mirrored_at(const ReflectionFit& reflection, const hull::Mesh& mesh, const Texel& texel, const Vector3f& eye) {
+  const auto& t = mesh.triangles[texel.triangle];
+  const float strength = (1 - texel.b1 - texel.b2) * reflection.strength[t[0]] + texel.b1 * reflection.strength[t[1]] +
+                         texel.b2 * reflection.strength[t[2]];
+  return strength *
+         mirrored_light(reflection.light, mirror_place(SphereGrid(kReflectionSide), reflection.around, mesh,
+                                                       reflection.normals, texel.triangle, texel.b1, texel.b2, eye));
+}
+
 }  // namespace
 
 ReflectionFit fit_reflection(const hull::Mesh& mesh, const Atlas& atlas, std::span<const PhotoSamples> photos,
@@ -404,15 +417,6 @@ ReflectionFit fit_reflection(const hull::Mesh& mesh, const Atlas& atlas, std::sp
   job.advance();
   job.end();
   return out;
-}
-
-Vector3f mirrored_at(const ReflectionFit& reflection, const hull::Mesh& mesh, const Texel& texel, const Vector3f& eye) {
-  const auto& t = mesh.triangles[texel.triangle];
-  const float strength = (1 - texel.b1 - texel.b2) * reflection.strength[t[0]] + texel.b1 * reflection.strength[t[1]] +
-                         texel.b2 * reflection.strength[t[2]];
-  return strength *
-         mirrored_light(reflection.light, mirror_place(SphereGrid(kReflectionSide), reflection.around, mesh,
-                                                       reflection.normals, texel.triangle, texel.b1, texel.b2, eye));
 }
 
 void take_off(const ReflectionFit& reflection, const hull::Mesh& mesh, const Atlas& atlas,

@@ -21,10 +21,10 @@ struct ReflectionFit {
   std::vector<float> strength;           ///< of the vertices, 0 … kMostStrength: how strongly they mirror
   /// Of a SphereGrid's nodes; then, as many, what comes on top where it is seen flatly, times grazing().
   std::vector<Eigen::Vector3f> light;
-  /// Of the variance about each texel's mean colour, at photographs that had no part in the fit, the share that it
-  /// explains; below 0 where it does harm.
+  /// Of the variance about each texel's mean colour, sRGB, at photographs that had no part in the fit, the share that
+  /// it explains; below 0 where it does harm.
   double held = 0;
-  double held_rms = 0;  ///< root mean square of that part, linear light
+  double held_rms = 0;  ///< root mean square of that part, sRGB values 0 … 1
 };
 
 inline constexpr int kReflectionSide = 64;
@@ -36,10 +36,6 @@ inline constexpr float kMostStrength = 4;
 /// says where that is more). See README, "Reflections".
 ReflectionFit fit_reflection(const hull::Mesh& mesh, const Atlas& atlas, std::span<const PhotoSamples> photos,
                              Job& job);
-
-/// What a texel mirrors to an eye, linear light.
-Eigen::Vector3f mirrored_at(const ReflectionFit& fit, const hull::Mesh& mesh, const Texel& texel,
-                            const Eigen::Vector3f& eye);
 
 /// The samples as they would be without it.
 void take_off(const ReflectionFit& fit, const hull::Mesh& mesh, const Atlas& atlas, std::span<PhotoSamples> photos,

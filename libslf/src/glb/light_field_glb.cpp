@@ -19,7 +19,8 @@ using internal::Json;
 using internal::JsonReader;
 
 constexpr const char* kExtension = "LUMIHULL_surface_light_field";
-constexpr int kVersion = 1, kVersionWithReflection = 3;  // which readers of the first would not notice
+// What readers of earlier ones would not notice: a reflection; its strength at each vertex, and how far it is.
+constexpr int kVersion = 1, kVersionWithReflection = 3, kWithoutStrength = 2;
 constexpr int kUnsignedShort = 5123, kUnsignedInt = 5125;
 constexpr std::uint64_t kMostMapBytes = std::uint64_t(1) << 32;  // of all terms' maps, unpacked
 constexpr std::size_t kMostInflation = 1032;  // deflate's: a run of 258 bytes takes two bits (RFC 1951, 3.2.5)
@@ -86,7 +87,8 @@ LightField light_field_of(const GlbFile& file) {
     throw Error(ErrorCode::bad_input, std::string("the model has no light field: expected the extension ") + kExtension,
                 file.name());
   const JsonReader extension = primitive.at("extensions").at(kExtension);
-  if (const auto version = extension.at("version").integer(1, 1'000'000); version > kVersionWithReflection)
+  const auto version = extension.at("version").integer(1, 1'000'000);
+  if (version > kVersionWithReflection)
     throw Error(ErrorCode::unsupported,
                 "light field of version " + std::to_string(version) + ", expected at most " +
                     std::to_string(kVersionWithReflection),
@@ -136,14 +138,18 @@ LightField light_field_of(const GlbFile& file) {
       if (n.isZero()) json.at("normals").fail("normals that are not zero");
       r.normals.push_back(n.normalized());
     }
-    const std::string_view strength = file.view(glb_index(json.at("strength")));
-    if (strength.size() != vertices) json.at("strength").fail("a byte for each vertex");
-    r.strength.assign(strength.begin(), strength.end());
-    r.strength_scale = scale_of(json.at("strengthScale"));
-    const JsonReader center = json.at("center");
-    if (center.array_size(3) != 3) center.fail("three numbers");
-    for (std::size_t i = 0; i < 3; ++i) r.center[std::ptrdiff_t(i)] = float(center.at(i).number(-1e30, 1e30));
-    r.inverse_radius = float(json.at("inverseRadius").number(0, 1e30));
+    if (version <= kWithoutStrength) {
+      r.strength.assign(vertices, 255);
+    } else {
+      const std::string_view strength = file.view(glb_index(json.at("strength")));
+      if (strength.size() != vertices) json.at("strength").fail("a byte for each vertex");
+      r.strength.assign(strength.begin(), strength.end());
+      r.strength_scale = scale_of(json.at("strengthScale"));
+      const JsonReader center = json.at("center");
+      if (center.array_size(3) != 3) center.fail("three numbers");
+      for (std::size_t i = 0; i < 3; ++i) r.center[std::ptrdiff_t(i)] = float(center.at(i).number(-1e30, 1e30));
+      r.inverse_radius = float(json.at("inverseRadius").number(0, 1e30));
+    }
     r.light = file.texture(glb_index(json.at("light")));
     r.grazing = file.texture_like(r.light, glb_index(json.at("grazing")));
     r.light_scale = scale_of(json.at("lightScale"));

@@ -77,7 +77,8 @@ std::vector<std::string> run(Capture& capture, Job& job) {
                 double(report.samples) / 1e6, 255 * report.rms, 255 * report.rms_of_mean, 100 * report.unseen_share);
   said.emplace_back(line);
   if (options.reflections) {
-    std::snprintf(line, sizeof line, "mirroring explains %.1f %% of what changes with the direction: %s",
+    std::snprintf(line, sizeof line,
+                  "mirroring explains %.1f %% of what changes with the direction at left-out photographs: %s",
                   100 * report.reflection_share, field.reflection ? "kept" : "left out");
     said.emplace_back(line);
   }
@@ -101,7 +102,7 @@ const StageDefinition& lightfield_stage() {
   static const LightFieldFileOptions file_defaults;
   static const StageDefinition stage{
       "lightfield",
-      4,
+      5,
       {
           {"factorization",
            "joint (all vertices together), pca or nmf (each vertex's ring of triangles by itself)",

@@ -30,8 +30,8 @@ struct HighlightPath {
 /// True highlights are spots of the gloss as it truly is (as much of it as is below white) that the photographs show,
 /// too, at least half as strong, and which a picture that misplaces the rest of the object by a pixel could not fake or
 /// hide: 30 % of their height, what is asked of a picture's, is at least what the picture without highlights changes
-/// there when it is shifted by a pixel. Those of two neighbouring views are one where each is the other's nearest on the
-/// surface, by less than two thirds of the distance of the next one; what cannot be told apart is not followed. A
+/// there when it is shifted by a pixel. Those of two neighbouring views are one where each is the other's nearest on
+/// the surface, by less than two thirds of the distance of the next one; what cannot be told apart is not followed. A
 /// highlight's way is what it moves over the surface: the place in a later view less the place in that view of the
 /// surface's point where it was before. So what is painted on the surface goes no way at all. Steps are at least 1 % of
 /// the shorter side: a shorter one is joined with the next. A picture's highlight is the spot nearest to the true

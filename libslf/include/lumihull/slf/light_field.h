@@ -96,7 +96,8 @@ struct LightFieldOptions {
       0.05;  ///< joint: pulls surface maps towards 0 where photographs say little, in shares of their weight
   double view_smoothness = 0.02;  ///< pulls neighbouring nodes' values together, in shares of the photographs' weight
   double min_cosine = 0.15;       ///< flatter views count next to nothing, 0 … 1
-  bool reflections = true;     ///< joint: looks for what all places mirror alike, and keeps it where it explains much
+  bool reflections =
+      true;  ///< joint: looks for what all places mirror alike, and keeps it where left-out photographs are met better
   bool even_exposure = false;  ///< evens out exposure and white balance between the photographs
   double visibility_offset =
       0.003;              ///< how far beside the surface a shadow starts to count, in diagonals of the mesh's box
@@ -113,8 +114,9 @@ struct LightFieldReport {
   std::uint64_t samples = 0;  ///< texels x photographs that see them
   std::vector<Eigen::Vector3f>
       gains;  ///< even_exposure: of each photograph, linear light, RGB; their geometric mean is 1
-  double reflection_share =
-      0;                   ///< of the samples' variance about each texel's mean that mirroring explains; 0: not asked
+  /// Of the samples' variance about each texel's mean, at photographs that had no part in the fit, the share that
+  /// mirroring explains; 0: not asked.
+  double reflection_share = 0;
   double rms = 0;          ///< of what is left of the samples' colours, sRGB values 0 … 1
   double rms_of_mean = 0;  ///< the same where only the mean colour is used
 };
