@@ -160,6 +160,10 @@ int Program::run(int argc, char** argv) {
     }
     std::cerr << "lumihull: " << e.what() << "\n";
     return e.code() == ErrorCode::invalid_argument ? 2 : 1;
+  } catch (const std::filesystem::filesystem_error& e) {
+    clear_bar();
+    std::cerr << "lumihull: " << e.path1().string() << ": " << e.code().message() << "\n";
+    return 1;
   } catch (const std::bad_alloc&) {
     clear_bar();
     std::cerr << "lumihull: out of memory\n";

@@ -132,7 +132,9 @@ TEST_F(GlbObject, WhatIsWrongIsNamed) {
                         {"/nodes/1/mesh", 3, "/meshes/3/primitives"},
                         {"/nodes/0/translation", Json::array({1, "x", 2}), "/nodes/0/translation"},
                         {"/materials/0/pbrMetallicRoughness/roughnessFactor", 7, "roughnessFactor"},
-                        {"/scene", "zero", "/scene"}}) {
+                        {"/scene", "zero", "/scene"},
+                        {"/scenes/0/nodes", Json::array({std::uint64_t(-1)}), "/scenes/0/nodes/0"},
+                        {"/meshes/0/primitives/0/indices", std::uint64_t(-1), "/primitives/0/indices"}}) {
     SCOPED_TRACE(c.at);
     EXPECT_NE(refusal(with(c.at, c.value)).find(c.named), std::string::npos);
   }

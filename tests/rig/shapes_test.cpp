@@ -186,9 +186,10 @@ TEST_F(MeshFile, HostileOnesAreErrorsThatNameTheFile) {
            vertices_ + "vt nan 0\nvt 0 0\nf 1/1 2/1 3/1\n",
            vertices_ + "vt 1e30 0\nvt 0 0\nf 1/1 2/1 3/1\n",
            vertices_ + "vt 0\nf 1/1 2/1 3/1\n",
-           vertices_ + uv + "f 1/1 2/2 9/3\n",                                   // a vertex that is not there
-           std::string("v 1 1 1\nv 1 1 1\nv 1 1 1\n") + uv + "f 1/1 2/2 3/3\n",  // no extent
-           vertices_ + uv,                                                       // no face
+           vertices_ + uv + "f 1/1 2/2 9/3\n",                                           // a vertex that is not there
+           std::string("v 1 1 1\nv 1 1 1\nv 1 1 1\n") + uv + "f 1/1 2/2 3/3\n",          // no extent
+           std::string("v 0 0 0\nv 1e-42 0 0\nv 0 1e-42 0\n") + uv + "f 1/1 2/2 3/3\n",  // one that can't be enlarged
+           vertices_ + uv,                                                               // no face
            std::string(),
        }) {
     SCOPED_TRACE(bad);

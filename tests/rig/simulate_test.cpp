@@ -228,15 +228,21 @@ TEST(Simulate, OptionsAreChecked) {
         +[](SimulateOptions& o) { o.size_m = NAN; }, +[](SimulateOptions& o) { o.jpeg_quality = 0; },
         +[](SimulateOptions& o) { o.object = "nothing"; }, +[](SimulateOptions& o) { o.density = 1; },
         +[](SimulateOptions& o) { o.focal_mm = 0; }, +[](SimulateOptions& o) { o.errors.winch_m = -1; },
+        +[](SimulateOptions& o) { o.photo.exposure = 0; }, +[](SimulateOptions& o) { o.photo.f_number = -1; },
+        +[](SimulateOptions& o) { o.circle_px = 900, o.least_targets = 0; },
         +[](SimulateOptions& o) { o.radius_m = 2.99, o.room_radius_m = 2; },
         +[](SimulateOptions& o) { o.radius_m = 4, o.carrier = Carrier::cables; }}) {
     SimulateOptions o = small();
     spoil(o);
     EXPECT_EQ(test::expect_error([&] { simulate(folder / "x", o, job); }).code(), ErrorCode::invalid_argument);
-    fs::remove_all(folder / "x");
+    EXPECT_FALSE(fs::exists(folder / "x")) << "nothing is made of what can't be";
   }
   write_file(folder / "something", "");
   EXPECT_EQ(test::expect_error([&] { simulate(folder / ".", small(), job); }).code(), ErrorCode::invalid_argument);
+  // A file in the folder's place, and in the way to it.
+  EXPECT_EQ(test::expect_error([&] { simulate(folder / "something", small(), job); }).code(),
+            ErrorCode::invalid_argument);
+  EXPECT_EQ(test::expect_error([&] { simulate(folder / "something" / "x", small(), job); }).code(), ErrorCode::io);
 }
 
 }  // namespace

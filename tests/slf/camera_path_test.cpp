@@ -58,13 +58,32 @@ TEST(CameraPath, UpOfPortraitPicturesIsAlongTheirLongerSide) {
     for (int i = 0; i < 24; ++i) {
       // From above to level, all around, held a little askew.
       const double azimuth = 2.4 * i, polar = .3 + .05 * i, askew = .06 * std::sin(5. * i);
-      const Eigen::Vector3d eye(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar));
+      const Eigen::Vector3d eye(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth),
+                                std::cos(polar));
       Pose pose = look_at(turn * eye, Eigen::Vector3d::Zero(), up);
       pose.rotation = Eigen::AngleAxisd(roll * 3.14159265358979 + askew, Eigen::Vector3d::UnitZ()) * pose.rotation;
       views.push_back({camera(60, 40, 50), pose});
     }
     EXPECT_GT(slf::up_axis(views).dot(up), std::cos(.05)) << roll;  // 24 azimuths do not cancel quite
   }
+}
+
+TEST(CameraPath, UpDoesNotDependOnTheSidesThatPhotographsAreFrom) {
+  const Eigen::Vector3d up = Eigen::Vector3d(-.1, .4, 1).normalized();
+  const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up);
+  for (const double roll : {0., .5, -.5})
+    for (const double from : {0., 1., 2.5}) {
+      std::vector<View> views;
+      for (int i = 0; i < 8; ++i) {  // within a quarter of a turn, from rather high up to level
+        const double azimuth = from + .2 * i, polar = .5 + .13 * ((5 * i) % 8), askew = .03 * std::sin(5. * i);
+        const Eigen::Vector3d eye(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth),
+                                  std::cos(polar));
+        Pose pose = look_at(turn * eye, Eigen::Vector3d::Zero(), up);
+        pose.rotation = Eigen::AngleAxisd(roll * 3.14159265358979 + askew, Eigen::Vector3d::UnitZ()) * pose.rotation;
+        views.push_back({camera(60, 40, 50), pose});
+      }
+      EXPECT_GT(slf::up_axis(views).dot(up), std::cos(.06)) << roll << ' ' << from;
+    }
 }
 
 TEST(CameraPath, FilesComeBackAsTheyWere) {

@@ -3,7 +3,9 @@
 #include <lumihull/internal/camera_json.h>
 #include <lumihull/slf/camera_path.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -44,6 +46,18 @@ Pose pose_at(const JsonReader& r) {
   return {rotation.normalized(), vector_at(pose.at("translation"))};
 }
 
+/// The direction that is most nearly across all of the axes whose sum of a aᵀ this is; askew: how nearly, 0 … 1 (1:
+/// they tell of no direction).
+struct Plumb {
+  Eigen::Vector3d axis;
+  double askew;
+};
+Plumb plumb_of(const Eigen::Matrix3d& axes) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(axes);
+  const Eigen::Vector3d l = eigen.eigenvalues();
+  return {eigen.eigenvectors().col(0), l[1] > 1e-3 * l[2] ? std::max(0., l[0]) / l[1] : 1};
+}
+
 }  // namespace
 
 std::string frame_name(std::size_t i) {
@@ -54,13 +68,22 @@ std::string frame_name(std::size_t i) {
 
 Eigen::Vector3d up_axis(std::span<const View> views) {
   Eigen::Vector3d up = Eigen::Vector3d::Zero(), across = up, out = up;
+  Eigen::Matrix3d widths = Eigen::Matrix3d::Zero(), heights = widths;
   for (const View& view : views) {
-    const Eigen::Quaterniond world_from_cam = view.cam_from_world.rotation.conjugate();
-    up -= world_from_cam * Eigen::Vector3d::UnitY();
-    across += world_from_cam * Eigen::Vector3d::UnitX();
-    out -= world_from_cam * Eigen::Vector3d::UnitZ();
+    const Eigen::Matrix3d world_from_cam = view.cam_from_world.rotation.conjugate().toRotationMatrix();
+    const Eigen::Vector3d x = world_from_cam.col(0), y = world_from_cam.col(1);
+    up -= y, across += x, out -= world_from_cam.col(2);
+    widths += x * x.transpose(), heights += y * y.transpose();
   }
-  // Of portrait pictures the longer side is upright; which way round, that cameras look down on things tells.
+  // The pictures' level sides are all across the plumb line, from whatever sides they were taken.
+  constexpr double kLevel = .05;
+  const Plumb landscape = plumb_of(widths), portrait = plumb_of(heights);
+  if (std::min(landscape.askew, portrait.askew) < kLevel) {
+    const bool upright = portrait.askew < .5 * landscape.askew;
+    // Which way round: of landscape pictures -y; of portrait ones that cameras look down on things.
+    return upright ? (portrait.axis.dot(out) < 0 ? Eigen::Vector3d(-portrait.axis) : portrait.axis)
+                   : (landscape.axis.dot(up) < 0 ? Eigen::Vector3d(-landscape.axis) : landscape.axis);
+  }
   if (across.norm() > 2 * up.norm()) up = across.dot(out) < 0 ? Eigen::Vector3d(-across) : across;
   return up.norm() > 1e-6 * double(views.size()) ? Eigen::Vector3d(up.normalized()) : Eigen::Vector3d::UnitZ();
 }

@@ -219,18 +219,23 @@ class RowTracer {
   std::vector<Hit> hits_, edge_hits_;
 };
 
+}  // namespace
+
 void check(const PhotoOptions& o) {
   const auto within = [](double x, double low, double high) { return x >= low && x <= high; };
-  if (!within(o.rays, 1, 64) || !within(o.edge_rays, 1, 64) || !within(o.exposure, 1e-6, 1e6) ||
-      !within(o.blur_px, 0, 100) || !within(o.full_well, 0, 1e12) || !within(o.read_noise, 0, 1e9) ||
-      !within(o.reduce, 1, 64) || (o.f_number != 0 && !within(o.f_number, .5, 1000)) || !within(o.focus_m, 0, 1e4) ||
-      !within(o.sensor_width_mm, .1, 1e4))
-    throw Error(ErrorCode::invalid_argument, "photo options are out of range", "rig");
-  if (o.depth && o.reduce > 1)
-    throw Error(ErrorCode::invalid_argument, "depth is known at full size only: reduce must be 1", "rig");
+  const auto expect = [](bool good, const char* what) {
+    if (!good) throw Error(ErrorCode::invalid_argument, what, "rig");
+  };
+  expect(within(o.rays, 1, 64) && within(o.edge_rays, 1, 64), "rays must be from 1 to 64 a side of a pixel");
+  expect(within(o.exposure, 1e-6, 1e6), "the exposure (brightness) must be from 1e-6 to 1e6");
+  expect(within(o.blur_px, 0, 100), "the lens's blur must be from 0 to 100 px");
+  expect(within(o.full_well, 0, 1e12) && within(o.read_noise, 0, 1e9), "the sensor's noise is out of range");
+  expect(within(o.reduce, 1, 64), "the picture must be traced at 1 to 1/64 of its size");
+  expect(o.f_number == 0 || within(o.f_number, .5, 1000), "the f-number must be from 0.5 to 1000, or 0 for a pinhole");
+  expect(within(o.focus_m, 0, 1e4), "the distance that is sharp must be from 0 to 10000 m");
+  expect(within(o.sensor_width_mm, .1, 1e4), "the sensor's width must be from 0.1 to 10000 mm");
+  expect(!o.depth || o.reduce == 1, "depth is known at full size only: not together with a reduced picture (--fast)");
 }
-
-}  // namespace
 
 PhotoOptions photo_options(Quality quality) {
   PhotoOptions options;

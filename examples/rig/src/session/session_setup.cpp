@@ -88,6 +88,9 @@ void check(const SimulateOptions& o) {
   expect(o.least_targets >= 0 && o.least_targets <= 1000, "least targets must be from 0 to 1000");
   expect(o.phi_from_rad >= 0 && o.phi_from_rad <= o.phi_to_rad && o.phi_to_rad < 3.2,
          "polar angles must ascend, from 0 to pi");
+  PhotoOptions photo = o.photo;
+  photo.depth = o.depth;
+  check(photo);
 }
 
 RobotErrors errors_of(const SimulateOptions& o, const capture::Plan& plan) {

@@ -38,8 +38,8 @@ class WillingOperator : public capture::Operator {
   const std::function<void(const std::string&)>& say_;
 };
 
-/// The folder is new, or was begun with these options.
-void begin(const fs::path& folder, const SimulateOptions& options) {
+/// The folder is new, or was begun with these options. Nothing is made.
+void check_folder(const fs::path& folder, const SimulateOptions& options) {
   const fs::path file = folder / "simulate.json";
   const std::string text = options_json(options);
   if (fs::exists(file)) {
@@ -47,11 +47,17 @@ void begin(const fs::path& folder, const SimulateOptions& options) {
       throw Error(ErrorCode::invalid_argument, "was begun with other options; name another folder", folder.string());
     return;
   }
-  if (fs::exists(folder) && !fs::is_empty(folder))
+  if (fs::exists(folder) && (!fs::is_directory(folder) || !fs::is_empty(folder)))
     throw Error(ErrorCode::invalid_argument, "expected a folder that is new, empty, or begun by `simulate`",
                 folder.string());
-  fs::create_directories(folder / "truth");
-  write_file(file, text);
+}
+
+/// After all is planned: what can't be is said before anything is made.
+void begin(const fs::path& folder, const SimulateOptions& options) {
+  std::error_code error;
+  fs::create_directories(folder / "truth", error);
+  if (error) throw Error(ErrorCode::io, "can't make the folder: " + error.message(), folder.string());
+  write_file(folder / "simulate.json", options_json(options));
 }
 
 class Simulation {
@@ -64,6 +70,7 @@ class Simulation {
     std::optional<capture::Plan> stored;
     if (fs::exists(capture::plan_path(folder_))) stored = capture::read_plan(capture::plan_path(folder_));
     session_ = plan_session(options_, stored, job_);
+    if (!fs::exists(folder_ / "simulate.json")) begin(folder_, options_);
     describe();
     if (!session_.targets.placed.empty()) session_.targets.set.save(folder_ / "sheets.json");
     photograph();
@@ -261,7 +268,7 @@ class Simulation {
 Simulated simulate(const fs::path& folder, const SimulateOptions& options, Job& job,
                    const std::function<void(const std::string&)>& say) {
   check(options);
-  begin(folder, options);
+  check_folder(folder, options);
   return Simulation(folder, options, job, say).run();
 }
 

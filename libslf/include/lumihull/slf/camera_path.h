@@ -23,9 +23,10 @@ struct PathView {
 /// "frame_0000", "frame_0001", …
 LUMIHULL_API std::string frame_name(std::size_t i);
 
-/// The direction that the photographs have as up: the mean of the cameras' up axes (-y), unit length. Cameras on a ring
-/// look down on the object from around; their ups' horizontal parts cancel. Where the x axes agree much more than the y
-/// axes pictures are in portrait, and up is along x, to the side from which cameras look. (0, 0, 1) where all vanish.
+/// The direction that the photographs have as up, unit length. Whoever photographs holds one side of the picture level:
+/// up is across all their x axes, or, of portrait pictures, across all their y axes, towards the side from which cameras
+/// look; it does not matter from which sides the photographs are. Where neither is so (cameras held anyhow, or all in
+/// one place), the mean of the cameras' -y, or of their x where these agree much more. (0, 0, 1) where all vanish.
 LUMIHULL_API Eigen::Vector3d up_axis(std::span<const View> views);
 
 struct TurntableOptions {

@@ -57,6 +57,9 @@ struct PhotoOptions {
   int reduce = 1;  ///< > 1: light is traced at 1/reduce of the size and enlarged bicubically; noise at full size
 };
 
+/// Error{invalid_argument} naming the first option that is out of range.
+void check(const PhotoOptions& options);
+
 /// Time against quality, for those who want to say it in one word. fast: a third of the size is traced. normal: what
 /// the options' defaults are. fine: 4 times the rays and paths, finer light maps.
 enum class Quality : std::uint8_t { fast, normal, fine };
