@@ -158,7 +158,7 @@ TEST(HighlightJudge, WhatPaintCouldFakeIsNotAsked) {
     for (int y = 0; y < image.height(); ++y)
       for (int x = 0; x < 3 * image.width(); ++x) {
         const float light =
-            linear_from_srgb(unit_of_srgb8(gloss.row<std::uint8_t>(y)[x])) + ((x / 3 + y) / 6 % 2 ? 0.15f : 0.4f);
+            linear_from_srgb(float(gloss.row<std::uint8_t>(y)[x]) / 255) + ((x / 3 + y) / 6 % 2 ? 0.15f : 0.4f);
         image.row<std::uint8_t>(y)[x] = std::uint8_t(std::lround(255 * srgb_from_linear(std::min(light, 1.0f))));
       }
     return image;
