@@ -17,7 +17,7 @@ if(NOT CMAKE_BUILD_TYPE)
 endif()
 
 find_program(LUMIHULL_CCACHE ccache)
-if(LUMIHULL_CCACHE AND PROJECT_IS_TOP_LEVEL)
+if(LUMIHULL_CCACHE AND PROJECT_IS_TOP_LEVEL AND NOT LUMIHULL_PRECOMPILED)  # it passes such files by
   set(CMAKE_C_COMPILER_LAUNCHER ${LUMIHULL_CCACHE})
   set(CMAKE_CXX_COMPILER_LAUNCHER ${LUMIHULL_CCACHE})
 endif()
@@ -34,6 +34,19 @@ find_package(embree 3 REQUIRED)
 
 include(GNUInstallDirs)
 
+# lumihull_precompile(TARGET): the target's files start from cmake/precompiled.h, which base parses for all of them.
+function(lumihull_precompile target)
+  if(NOT LUMIHULL_PRECOMPILED)
+    return()
+  endif()
+  set_target_properties(${target} PROPERTIES DEFINE_SYMBOL "")  # GCC takes what was parsed only under the same macros
+  if(target STREQUAL "lumihull_base")
+    target_precompile_headers(${target} PRIVATE ${PROJECT_SOURCE_DIR}/cmake/precompiled.h)
+  else()
+    target_precompile_headers(${target} REUSE_FROM lumihull_base)
+  endif()
+endfunction()
+
 add_library(lumihull_flags INTERFACE)
 target_compile_options(lumihull_flags INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual>
@@ -43,8 +56,11 @@ target_compile_options(lumihull_flags INTERFACE
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   # False alarms for std::string's operator+ (GCC bug 105329).
   target_compile_options(lumihull_flags INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wno-restrict>)
-  # At -O3, false alarms for Eigen's packets of four beside vectors of three, and for its small matrices; pages long.
-  target_compile_options(lumihull_flags INTERFACE $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-Wno-array-bounds$<SEMICOLON>-Wno-maybe-uninitialized>)
+  # At -O3, false alarms for Eigen's packets of four beside vectors of three, and for its small matrices; with precompiled
+  # headers for std::string, too; pages long.
+  foreach(alarm array-bounds maybe-uninitialized stringop-overflow stringop-overread)
+    target_compile_options(lumihull_flags INTERFACE $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-Wno-${alarm}>)
+  endforeach()
 endif()
 if(LUMIHULL_WERROR)
   target_compile_options(lumihull_flags INTERFACE -Werror)
@@ -83,6 +99,7 @@ function(lumihull_library name folder)
   set_target_properties(lumihull_${name} PROPERTIES
     EXPORT_NAME ${name} VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}
     INSTALL_RPATH "$ORIGIN")
+  lumihull_precompile(lumihull_${name})
   install(TARGETS lumihull_${name} EXPORT lumihull-targets
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} FILE_SET HEADERS)
 endfunction()

@@ -1,8 +1,9 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/parallel.h>
 #include <lumihull/hull/region.h>
+#include <lumihull/internal/small_matrices.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -66,10 +67,9 @@ std::optional<Box> meet_rays(std::span<const View> views, std::span<const Silhou
     a += across;
     b += across * views[i].center();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(a);
-  if (!(eigen.eigenvalues()[0] > 1e-6 * eigen.eigenvalues()[2])) return std::nullopt;
-  const Eigen::Vector3d point =
-      eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * (eigen.eigenvectors().transpose() * b);
+  const internal::SymmetricAxes axes = internal::symmetric_axes(a);
+  if (!(axes.values[0] > 1e-6 * axes.values[2])) return std::nullopt;
+  const Eigen::Vector3d point = axes.vectors * (axes.vectors.transpose() * b).cwiseQuotient(axes.values);
   std::vector<double> halves;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const double depth = (views[i].cam_from_world * point).z();

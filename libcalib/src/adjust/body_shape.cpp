@@ -1,7 +1,8 @@
 #include "body_shape.h"
 
+#include <lumihull/internal/small_matrices.h>
+
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 
 namespace lumihull::calib::bundle {
@@ -47,11 +48,9 @@ ShapedPoint shaped(const BodyPoint& point, BodyModel model, const Eigen::Vector3
 }
 
 BestTurn best_turn(const Eigen::Matrix3d& product) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d sign(1, 1, 1);
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1;
-  const Eigen::Vector3d& s = svd.singularValues();
-  return {svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose(), s.dot(sign), s[1] > 1e-9 * s[0]};
+  const internal::NearestRotation nearest = internal::nearest_rotation(product);
+  const Eigen::Vector3d& s = nearest.singular_values;
+  return {nearest.rotation, s[0] + s[1] + (nearest.reflected ? -s[2] : s[2]), s[1] > 1e-9 * s[0]};
 }
 
 }  // namespace lumihull::calib::bundle

@@ -3,8 +3,8 @@
 #include <lumihull/base/error.h>
 #include <lumihull/base/parallel.h>
 #include <lumihull/calib/calibrate.h>
+#include <lumihull/internal/small_matrices.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -249,11 +249,11 @@ Pose chosen_frame(const Network& n, int part, double* bend) {
   for (const Vector3d& p : points) mean += p / double(points.size());
   Matrix3d scatter = Matrix3d::Zero();
   for (const Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose() / double(points.size());
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(scatter);
-  const Vector3d sizes = axes.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const internal::SymmetricAxes axes = internal::symmetric_axes(scatter);
+  const Vector3d sizes = axes.values.cwiseMax(0).cwiseSqrt();
   const Pose body_frame = n.bodies[std::size_t(most)].body.world_from_body;
   if (n.bodies.size() < 2 || !(sizes[0] < kSheet * sizes[2])) return body_frame.inverse();
-  Vector3d up = axes.eigenvectors().col(0);
+  Vector3d up = axes.vectors.col(0);
   if (up.dot(facing) < 0) up = -up;
   for (const Vector3d& p : points) *bend = std::max(*bend, std::abs((p - mean).dot(up)));
   Vector3d x = body_frame.rotation * Vector3d::UnitX();

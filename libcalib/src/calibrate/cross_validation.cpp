@@ -2,9 +2,9 @@
 #include "cross_validation.h"
 
 #include <lumihull/base/error.h>
+#include <lumihull/internal/small_matrices.h>
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -71,9 +71,7 @@ void cross_validate(const Network& whole, SettleOptions options, Calibration& c,
   for (std::size_t i = 0; i < a.size(); ++i) mean_a += a[i] / double(a.size()), mean_b += b[i] / double(a.size());
   Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < a.size(); ++i) cross += (b[i] - mean_b) * (a[i] - mean_a).transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV()).determinant() < 0 ? -1 : 1);
-  const Eigen::Matrix3d turn = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  const Eigen::Matrix3d turn = internal::nearest_rotation(cross).rotation;
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += (turn * (a[i] - mean_a) + mean_b - b[i]).squaredNorm();
   c.cross_validation_m = std::sqrt(sum / double(a.size()));

@@ -2,6 +2,7 @@
 #include "settle.h"
 
 #include <lumihull/base/error.h>
+#include <lumihull/internal/small_matrices.h>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -39,7 +40,6 @@ std::vector<Pose> rig_of(const Network& n, int part, const std::vector<bool>& us
       throw Error(ErrorCode::degenerate,
                   "no shot has both this camera and the first one: how they lie to each other can't be told",
                   "camera " + std::to_string(c));
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotations, Eigen::ComputeFullU | Eigen::ComputeFullV);
     Eigen::Vector3d middle;
     for (int k = 0; k < 3; ++k) {
       std::vector<double> values;
@@ -47,7 +47,7 @@ std::vector<Pose> rig_of(const Network& n, int part, const std::vector<bool>& us
       std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2), values.end());
       middle[k] = values[values.size() / 2];
     }
-    poses[c] = Pose::from_matrix(svd.matrixU() * svd.matrixV().transpose(), middle);
+    poses[c] = Pose::from_matrix(internal::nearest_rotation(rotations).rotation, middle);
   }
   return poses;
 }

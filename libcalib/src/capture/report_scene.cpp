@@ -1,8 +1,8 @@
 // Cameras and targets in space, as SVG. Every shape carries its points, so that a short script can turn the view.
 #include <lumihull/internal/html.h>
+#include <lumihull/internal/small_matrices.h>
 #include <lumihull/internal/svg_figure.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -121,16 +121,16 @@ void add_outlines(const TargetSet& set, const CalibratedBody& body, const Frame&
 /// Three great circles of the ellipsoid of one standard deviation, `times` as large.
 void add_ellipsoid(const Vector3d& center, const Eigen::Matrix3d& covariance, double times, const Frame& frame,
                    std::vector<Shape>& shapes) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);
-  const Vector3d sigma = axes.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const internal::SymmetricAxes axes = internal::symmetric_axes(covariance);
+  const Vector3d sigma = axes.values.cwiseMax(0).cwiseSqrt();
   constexpr int kSteps = 20;
   for (int k = 0; k < 3; ++k) {
     Shape ring{"sigma", {}, ""};
     const int a = k, b = (k + 1) % 3;
     for (int i = 0; i <= kSteps; ++i) {
       const double t = 2 * std::numbers::pi * i / kSteps;
-      ring.points.push_back(frame(center + times * (std::cos(t) * sigma(a) * axes.eigenvectors().col(a) +
-                                                    std::sin(t) * sigma(b) * axes.eigenvectors().col(b))));
+      ring.points.push_back(frame(center + times * (std::cos(t) * sigma(a) * axes.vectors.col(a) +
+                                                    std::sin(t) * sigma(b) * axes.vectors.col(b))));
     }
     shapes.push_back(std::move(ring));
   }
@@ -188,8 +188,7 @@ std::string svg(const std::vector<Shape>& shapes, int width, int height, double 
 }  // namespace
 
 double longest_axis(const Eigen::Matrix3d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, axes.eigenvalues()(2)));
+  return std::sqrt(std::max(0.0, internal::symmetric_axes(covariance).values(2)));
 }
 
 std::string scene(const TargetModel& model) {

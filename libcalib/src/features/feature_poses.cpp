@@ -5,8 +5,10 @@
 #include <lumihull/base/import.h>
 #include <lumihull/calib/calibrate_capture.h>
 #include <lumihull/calib/feature_poses.h>
+#include <lumihull/internal/small_matrices.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -68,9 +70,8 @@ std::optional<Eigen::Vector3d> nearest_point(const std::vector<std::pair<Eigen::
     a += across;
     b += across * origin;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(a);
   constexpr double kLeastParallax = 1e-3;  // squared sine of about 2 degrees, mean over the rays
-  if (!(axes.eigenvalues()(0) > kLeastParallax * double(rays.size()))) return std::nullopt;
+  if (!(internal::symmetric_axes(a).values(0) > kLeastParallax * double(rays.size()))) return std::nullopt;
   return a.ldlt().solve(b);
 }
 

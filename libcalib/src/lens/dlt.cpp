@@ -1,7 +1,7 @@
 #include <lumihull/base/error.h>
 #include <lumihull/calib/resect.h>
+#include <lumihull/internal/small_matrices.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
 
@@ -30,7 +30,7 @@ Eigen::Matrix<double, 3, 4> direct_linear_transform(std::span<const Eigen::Vecto
   if (!std::isfinite(spread2) || !moments.allFinite())
     throw Error(ErrorCode::invalid_argument, "points must be finite", "direct_linear_transform");
   const double scale2 = std::sqrt(spread2 / 2), scale3 = std::sqrt(moments.trace() / 3);
-  const Eigen::Vector3d extent = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moments).eigenvalues();
+  const Eigen::Vector3d extent = internal::symmetric_axes(moments).values;
   if (!(scale2 > 0) || !(extent[0] > 1e-10 * extent[2])) degenerate("points lie in one plane, or on a line");
 
   LinearSums sums;

@@ -2,8 +2,7 @@
 #include <lumihull/calib/lens_calibration.h>
 #include <lumihull/internal/camera_json.h>
 #include <lumihull/internal/json.h>
-
-#include <Eigen/Eigenvalues>
+#include <lumihull/internal/small_matrices.h>
 
 namespace lumihull::calib {
 namespace {
@@ -74,13 +73,7 @@ LensCalibration load_intrinsics(const std::filesystem::path& file) {
     if (!(c(i, i) >= 0)) row.at(std::size_t(i)).fail("a variance of at least 0");
   }
   if (!(c - c.transpose()).isMuchSmallerThan(c.cwiseAbs().maxCoeff() + 1e-300, 1e-9)) rows.fail("a symmetric matrix");
-  // Scaled to a unit diagonal, no eigenvalue may be negative.
-  Eigen::Matrix<double, kIntrinsics, 1> unit;
-  for (int i = 0; i < kIntrinsics; ++i) unit(i) = c(i, i) > 0 ? 1 / std::sqrt(c(i, i)) : 0;
-  const Eigen::Matrix<double, kIntrinsics, kIntrinsics> scaled = unit.asDiagonal() * c * unit.asDiagonal();
-  if (!(Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, kIntrinsics, kIntrinsics>>(scaled).eigenvalues()(0) >
-        -1e-6))
-    rows.fail("a covariance (no negative eigenvalue)");
+  if (!internal::is_covariance(c)) rows.fail("a covariance (no negative eigenvalue)");
   for (int i = 0; i < kIntrinsics; ++i)
     if (!(c(i, i) > 0) && !c.row(i).isZero(0)) rows.at(std::size_t(i)).fail("zeros where the variance is 0");
   return calibration;

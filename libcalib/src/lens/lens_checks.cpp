@@ -1,6 +1,8 @@
 #include "lens_checks.h"
 
-#include <Eigen/Dense>
+#include <lumihull/internal/small_matrices.h>
+
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -24,7 +26,7 @@ Eigen::Vector3d normal_of(const FittedView& view) {
   mean /= double(view.view->matches.size());
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (const BoardMatch& m : view.view->matches) spread += (m.board - mean) * (m.board - mean).transpose();
-  return view.cam_from_board.rotation * Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
+  return view.cam_from_board.rotation * internal::symmetric_axes(spread).vectors.col(0);
 }
 
 }  // namespace
@@ -73,37 +75,43 @@ std::vector<std::string> weak_geometry(const LensCalibration& result, std::span<
   double farthest = 0, corner = 0;
   const Eigen::Vector2d center(camera.u0, camera.v0);
   for (const double x : {0.0, double(camera.width)})
-    for (const double y : {0.0, double(camera.height)}) corner = std::max(corner, (Eigen::Vector2d(x, y) - center).norm());
+    for (const double y : {0.0, double(camera.height)})
+      corner = std::max(corner, (Eigen::Vector2d(x, y) - center).norm());
   for (const LensCalibration::Residual& r : result.residuals) {
     if (r.outlier) continue;
     const Eigen::Vector2d px = views[std::size_t(r.view)].matches[std::size_t(r.match)].pixel;
     farthest = std::max(farthest, (px - center).norm());
-    const int x = std::clamp(int(8 * px.x() / camera.width), 0, 7), y = std::clamp(int(6 * px.y() / camera.height), 0, 5);
+    const int x = std::clamp(int(8 * px.x() / camera.width), 0, 7),
+              y = std::clamp(int(6 * px.y() / camera.height), 0, 5);
     seen[std::size_t(8 * y + x)] = true;
   }
   const double covered = double(std::count(seen.begin(), seen.end(), true)) / double(seen.size());
   const bool distortion = free[5] || free[6] || free[7] || free[8] || free[9];
   if (distortion && (farthest < 0.7 * corner || covered < 0.5))
-    problems.push_back("the targets cover " + text("%.0f", 100 * covered) + " % of the picture and reach " +
-                       text("%.0f", 100 * farthest / corner) +
-                       " % of the way to its corners: beyond that the lens is extrapolated; take views with the target in "
-                       "the corners");
+    problems.push_back(
+        "the targets cover " + text("%.0f", 100 * covered) + " % of the picture and reach " +
+        text("%.0f", 100 * farthest / corner) +
+        " % of the way to its corners: beyond that the lens is extrapolated; take views with the target in "
+        "the corners");
 
   for (const FittedView& view : fitted) {
     const auto out = std::count(view.counts.begin(), view.counts.end(), 0);
     if (5 * std::size_t(out) > view.counts.size())
       problems.push_back("view " + view.view->name + ": " + std::to_string(out) + " of " +
-                         std::to_string(view.counts.size()) + " points are outliers; is the photograph good, the target "
+                         std::to_string(view.counts.size()) +
+                         " points are outliers; is the photograph good, the target "
                          "the right one and flat?");
   }
   if (result.sigma0 > 3)
-    problems.push_back("residuals are " + text("%.1f", result.sigma0) +
-                       " times what the points' covariances say: the target is not as it is described (flat? print scale?), "
-                       "the lens needs more terms, or the covariances are too small");
+    problems.push_back(
+        "residuals are " + text("%.1f", result.sigma0) +
+        " times what the points' covariances say: the target is not as it is described (flat? print scale?), "
+        "the lens needs more terms, or the covariances are too small");
   if (result.cross_validation_sigma > 3)
-    problems.push_back("two halves of the views differ " + text("%.1f", result.cross_validation_sigma) +
-                       " times as much as their covariances expect: zoom, focus or target changed between views, or errors "
-                       "are systematic");
+    problems.push_back(
+        "two halves of the views differ " + text("%.1f", result.cross_validation_sigma) +
+        " times as much as their covariances expect: zoom, focus or target changed between views, or errors "
+        "are systematic");
   return problems;
 }
 

@@ -2,8 +2,10 @@
 
 #include <lumihull/base/error.h>
 #include <lumihull/calib/resect.h>
+#include <lumihull/internal/small_matrices.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -25,10 +27,10 @@ constexpr double kPlanar = 0.05;
 /// What one view's points map by, up to the camera's matrix: a homography of their plane, or a projection.
 struct ViewMap {
   bool planar = true;
-  Pose plane_from_board;          ///< planar: points are (a, b, about 0) in it
-  Matrix3d homography;            ///< of (a, b)
-  Matrix34d projection;           ///< of board points
-  Vector3d inside{0, 0, 0};       ///< the points' mean, in the board's frame
+  Pose plane_from_board;     ///< planar: points are (a, b, about 0) in it
+  Matrix3d homography;       ///< of (a, b)
+  Matrix34d projection;      ///< of board points
+  Vector3d inside{0, 0, 0};  ///< the points' mean, in the board's frame
 };
 
 Vector2d in_plane(const ViewMap& map, const Vector3d& board) { return (map.plane_from_board * board).head<2>(); }
@@ -63,7 +65,8 @@ Matrix3d trimmed_homography(std::span<const Vector2d> a, std::span<const Vector2
     std::array<std::size_t, 4> chosen{};
     for (std::size_t k = 0; k < 4; ++k) {
       do chosen[k] = next(n);
-      while (std::find(chosen.begin(), chosen.begin() + std::ptrdiff_t(k), chosen[k]) != chosen.begin() + std::ptrdiff_t(k));
+      while (std::find(chosen.begin(), chosen.begin() + std::ptrdiff_t(k), chosen[k]) !=
+             chosen.begin() + std::ptrdiff_t(k));
       from[k] = a[chosen[k]];
       to[k] = b[chosen[k]];
     }
@@ -92,15 +95,15 @@ ViewMap map_view(const BoardView& view, std::span<const Vector2d> pixels, bool r
   map.inside /= double(matches.size());
   Matrix3d spread = Matrix3d::Zero();
   for (const BoardMatch& m : matches) spread += (m.board - map.inside) * (m.board - map.inside).transpose();
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(spread);
-  const Vector3d extent = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const internal::SymmetricAxes principal = internal::symmetric_axes(spread);
+  const Vector3d extent = principal.values.cwiseMax(0).cwiseSqrt();
   if (!(extent(2) > 0)) throw Error(ErrorCode::degenerate, "all its points are one point");
   if (!(extent(1) > 1e-6 * extent(2))) throw Error(ErrorCode::degenerate, "its points lie on one line");
   map.planar = extent(0) <= kPlanar * extent(2) || matches.size() < 6;
   if (map.planar) {
     Matrix3d axes;
-    axes << eigen.eigenvectors().col(2), eigen.eigenvectors().col(1),
-        Vector3d(eigen.eigenvectors().col(2)).cross(Vector3d(eigen.eigenvectors().col(1)));
+    axes << principal.vectors.col(2), principal.vectors.col(1),
+        Vector3d(principal.vectors.col(2)).cross(Vector3d(principal.vectors.col(1)));
     map.plane_from_board = Pose::from_matrix(axes.transpose(), -axes.transpose() * map.inside);
     std::vector<Vector2d> plane;
     for (const BoardMatch& m : matches) plane.push_back(in_plane(map, m.board));

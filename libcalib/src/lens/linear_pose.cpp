@@ -1,5 +1,7 @@
 #include "lens/linear_pose.h"
 
+#include <lumihull/internal/small_matrices.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -63,12 +65,9 @@ bool linear_pose(const ResectionPoints& points, LocalPose& pose, bool& reflected
   m.row(0) += mean.x() * m.row(2), m.row(1) += mean.y() * m.row(2);
   const Matrix3d left = m.leftCols<3>();
   reflected = left.determinant() < 0;
-  const Eigen::JacobiSVD<Matrix3d> svd(left, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double scale = left.norm() / std::sqrt(3.0);
   if (!(scale > 0)) return false;
-  Matrix3d flip = Matrix3d::Identity();
-  if (reflected) flip(2, 2) = -1;
-  pose.rotation = svd.matrixU() * flip * svd.matrixV().transpose();
+  pose.rotation = internal::nearest_rotation(left).rotation;
   pose.center = m.col(3) / scale;
   return pose.center.allFinite();
 }

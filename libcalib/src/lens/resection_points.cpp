@@ -2,8 +2,8 @@
 
 #include <lumihull/base/error.h>
 #include <lumihull/calib/circle_projection.h>
+#include <lumihull/internal/small_matrices.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <array>
@@ -72,10 +72,9 @@ ResectionPoints::ResectionPoints(const Camera& cam, std::span<const PointMatch> 
   if (!four_places(matches, std::max(10 * rounding, 1e-9 * unit)))
     throw Error(ErrorCode::degenerate, "expected at least 4 different world points: repeated ones don't count",
                 "resect");
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(moments / (unit * unit));
-  extent = principal.eigenvalues().reverse().cwiseMax(0).cwiseSqrt();
-  axes << principal.eigenvectors().col(2), principal.eigenvectors().col(1),
-      principal.eigenvectors().col(2).cross(principal.eigenvectors().col(1));
+  const internal::SymmetricAxes principal = internal::symmetric_axes(moments / (unit * unit));
+  extent = principal.values.reverse().cwiseMax(0).cwiseSqrt();
+  axes << principal.vectors.col(2), principal.vectors.col(1), principal.vectors.col(2).cross(principal.vectors.col(1));
   if (!(extent[1] > std::max(1e-6, 10 * rounding / unit)))
     throw Error(ErrorCode::degenerate, "all world points lie on one line: the rotation about it is unknown", "resect");
 

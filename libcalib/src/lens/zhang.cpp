@@ -1,6 +1,9 @@
 #include "zhang.h"
 
-#include <Eigen/Dense>
+#include <lumihull/internal/small_matrices.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
 #include <cmath>
 
 namespace lumihull::calib::lens {
@@ -10,14 +13,12 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// The rotation that is nearest to m in the Frobenius norm, and m's mean singular value; false where m has no rank 3.
-bool nearest_rotation(const Matrix3d& m, Matrix3d& rotation, double& scale) {
-  const Eigen::JacobiSVD<Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Vector3d s = svd.singularValues();
+/// The rotation that is nearest to m, and m's mean singular value; false where m has no rank 3.
+bool rotation_and_scale(const Matrix3d& m, Matrix3d& rotation, double& scale) {
+  const internal::NearestRotation nearest = internal::nearest_rotation(m);
+  const Vector3d& s = nearest.singular_values;
   if (!(s(2) > 1e-12 * s(0)) || !std::isfinite(s(0))) return false;
-  Matrix3d u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) = -u.col(2);
-  rotation = u * svd.matrixV().transpose();
+  rotation = nearest.rotation;
   scale = s.mean();
   return true;
 }
@@ -88,7 +89,7 @@ std::optional<Pose> pose_from_homography(const Matrix3d& h, const Vector2d& insi
   frame << m.col(0), m.col(1), m.col(0).cross(m.col(1));
   Matrix3d rotation;
   double scale = 1;
-  if (!frame.allFinite() || !nearest_rotation(frame, rotation, scale)) return std::nullopt;
+  if (!frame.allFinite() || !rotation_and_scale(frame, rotation, scale)) return std::nullopt;
   return Pose::from_matrix(rotation, m.col(2));
 }
 
@@ -97,7 +98,7 @@ std::optional<Pose> pose_from_projection(const Eigen::Matrix<double, 3, 4>& proj
   if ((m * inside.homogeneous()).z() < 0) m = -m;
   Matrix3d rotation;
   double scale = 1;
-  if (!m.allFinite() || !nearest_rotation(m.leftCols<3>(), rotation, scale)) return std::nullopt;
+  if (!m.allFinite() || !rotation_and_scale(m.leftCols<3>(), rotation, scale)) return std::nullopt;
   return Pose::from_matrix(rotation, m.col(3) / scale);
 }
 

@@ -4,9 +4,9 @@
 
 #include <fcntl.h>
 #include <lumihull/base/parallel.h>
+#include <lumihull/internal/small_matrices.h>
 #include <unistd.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
@@ -80,12 +80,11 @@ void check_output(const fs::path& output) {
     throw Error(ErrorCode::invalid_argument, "the folder is in use: an import makes a new capture", output.string());
 }
 
-std::optional<Eigen::Matrix3d> nearest_rotation(const Eigen::Matrix3d& m, double tolerance) {
+std::optional<Eigen::Matrix3d> rotation_within(const Eigen::Matrix3d& m, double tolerance) {
   if (!m.allFinite()) return std::nullopt;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d r = svd.matrixU() * svd.matrixV().transpose();
-  if (r.determinant() < 0 || (r - m).cwiseAbs().maxCoeff() > tolerance) return std::nullopt;
-  return r;
+  const internal::NearestRotation nearest = internal::nearest_rotation(m);
+  if (nearest.reflected || (nearest.rotation - m).cwiseAbs().maxCoeff() > tolerance) return std::nullopt;
+  return nearest.rotation;
 }
 
 Camera camera_from_matrix(const Eigen::Matrix3d& k, double shift, int width, int height) {

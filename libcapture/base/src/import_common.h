@@ -61,7 +61,7 @@ Capture build_capture(Imported imported, const std::vector<ImageInfo>& infos, co
 
 /// The rotation nearest to a matrix (orthogonal Procrustes by SVD); nullopt where it is farther than `tolerance` from
 /// one in any entry, or mirrored.
-std::optional<Eigen::Matrix3d> nearest_rotation(const Eigen::Matrix3d& m, double tolerance);
+std::optional<Eigen::Matrix3d> rotation_within(const Eigen::Matrix3d& m, double tolerance);
 
 /// K of a 3 x 3 upper triangular matrix with K(2,2) = 1; `shift` is added to the principal point.
 Camera camera_from_matrix(const Eigen::Matrix3d& k, double shift, int width, int height);

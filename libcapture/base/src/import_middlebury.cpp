@@ -44,7 +44,7 @@ std::vector<MiddleburyLine> parse_middlebury(std::string_view text, const std::s
     if (entry.k(1, 0) != 0 || entry.k(2, 0) != 0 || entry.k(2, 1) != 0 || !(entry.k(0, 0) > 0) ||
         !(entry.k(1, 1) > 0) || !(std::abs(entry.k(2, 2)) > 1e-12))
       fail_at_line(file, number, "K is not an upper triangular camera matrix of positive focal lengths");
-    const auto rotation = nearest_rotation(entry.r, 1e-4);
+    const auto rotation = rotation_within(entry.r, 1e-4);
     if (!rotation) fail_at_line(file, number, "R is not a rotation (orthogonal, determinant 1)");
     entry.r = *rotation;
     result.push_back(std::move(entry));

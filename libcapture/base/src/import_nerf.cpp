@@ -80,7 +80,7 @@ std::vector<NerfFrame> parse_nerf(std::string_view text, const std::string& file
         if (r == 3 && std::abs(value - (c == 3 ? 1 : 0)) > 1e-6) matrix.at(r).fail("the row 0 0 0 1");
       }
     }
-    const auto rotation = nearest_rotation(world_from_cam.leftCols<3>(), 1e-3);
+    const auto rotation = rotation_within(world_from_cam.leftCols<3>(), 1e-3);
     if (!rotation) matrix.fail("a rotation (orthogonal, determinant 1) in the left 3 x 3 block");
     // OpenGL's camera looks along -z with y up: two axes change sign.
     const Eigen::Matrix3d flip = Eigen::Vector3d(1, -1, -1).asDiagonal();

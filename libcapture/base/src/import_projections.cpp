@@ -1,9 +1,12 @@
 // Listings of projection matrices.
 
 #include <lumihull/base/files.h>
+#include <lumihull/internal/small_matrices.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -47,8 +50,8 @@ std::vector<ProjectionLine> parse_projections(std::string_view text, const std::
     // Scale is arbitrary: make the largest entry 1, so that singular is not a question of units.
     const double largest = entry.matrix.cwiseAbs().maxCoeff();
     if (largest > 0) entry.matrix /= largest;
-    const Eigen::JacobiSVD<Matrix3d> svd(entry.matrix.leftCols<3>());
-    if (!(largest > 0) || !(svd.singularValues()(2) > 1e-13 * svd.singularValues()(0)))
+    const Vector3d sizes = internal::nearest_rotation(entry.matrix.leftCols<3>()).singular_values;
+    if (!(largest > 0) || !(sizes(2) > 1e-13 * sizes(0)))
       fail_at_line(file, number, "the matrix is singular: its left 3 x 3 block has no inverse, so it is no camera");
     result.push_back(std::move(entry));
   }
@@ -86,9 +89,9 @@ std::optional<Vector3d> point_looked_at(const std::vector<ProjectionLine>& lines
     a += across;
     b += across * center;
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(a);
-  if (!(eigen.eigenvalues()(0) > 1e-9 * double(lines.size()))) return std::nullopt;
-  return eigen.eigenvectors() * (eigen.eigenvectors().transpose() * b).cwiseQuotient(eigen.eigenvalues());
+  const internal::SymmetricAxes axes = internal::symmetric_axes(a);
+  if (!(axes.values(0) > 1e-9 * double(lines.size()))) return std::nullopt;
+  return axes.vectors * (axes.vectors.transpose() * b).cwiseQuotient(axes.values);
 }
 
 std::string some_names(const std::vector<std::string>& names) {

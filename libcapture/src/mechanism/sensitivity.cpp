@@ -1,7 +1,7 @@
 // How far the platform moves when cables are longer or shorter than they should be.
 #include <lumihull/capture/sensitivity.h>
+#include <lumihull/internal/small_matrices.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -49,7 +49,7 @@ Sensitivity sensitivity(const Mechanism& mechanism, const Pose& world_from_platf
   }
   const Matrix6 inverse = square.fullPivLu().inverse();
   const auto largest = [](const Eigen::Matrix3d& block) {
-    return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(block, Eigen::EigenvaluesOnly).eigenvalues()[2]);
+    return std::sqrt(internal::symmetric_axes(block).values[2]);
   };
   result.translation_joint = largest(inverse.topLeftCorner<3, 3>());
   result.rotation_joint = largest(inverse.bottomRightCorner<3, 3>());

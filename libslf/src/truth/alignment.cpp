@@ -1,6 +1,8 @@
 #include "alignment.h"
 
-#include <Eigen/Dense>
+#include <lumihull/internal/small_matrices.h>
+
+#include <Eigen/Geometry>
 
 namespace lumihull::slf::truth {
 namespace {
@@ -24,13 +26,6 @@ Moments moments_of(std::span<const Eigen::Vector3d> from, std::span<const Eigen:
   return m;
 }
 
-/// The rotation R of largest tr(Rᵀ M).
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d sign(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-  return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-}
-
 Similarity with_rotation(const Eigen::Matrix3d& rotation, const Moments& m, bool rigid) {
   Similarity s;
   const double square = m.spread.trace();
@@ -43,7 +38,7 @@ Similarity with_rotation(const Eigen::Matrix3d& rotation, const Moments& m, bool
 
 Similarity align_points(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to, bool rigid) {
   const Moments m = moments_of(from, to);
-  return with_rotation(nearest_rotation(m.product), m, rigid);
+  return with_rotation(internal::nearest_rotation(m.product).rotation, m, rigid);
 }
 
 std::optional<CameraAlignment> align_cameras(std::span<const Pose> cam_from_capture,
@@ -57,12 +52,12 @@ std::optional<CameraAlignment> align_cameras(std::span<const Pose> cam_from_capt
   }
   if (from.empty()) return std::nullopt;
   const Moments m = moments_of(from, to);
-  const Eigen::Vector3d axes =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m.spread).eigenvalues().cwiseMax(0).cwiseSqrt();
+  const Eigen::Vector3d axes = internal::symmetric_axes(m.spread).values.cwiseMax(0).cwiseSqrt();
   if (!rigid && !(axes[2] > 0)) return std::nullopt;
   CameraAlignment a;
   a.by_rotations = from.size() < 3 || !(axes[1] > kLine * axes[2]);
-  a.truth_from_capture = with_rotation(nearest_rotation(a.by_rotations ? turns : m.product), m, rigid);
+  a.truth_from_capture =
+      with_rotation(internal::nearest_rotation(a.by_rotations ? turns : m.product).rotation, m, rigid);
   if (!(a.truth_from_capture.scale > 0)) return std::nullopt;
   return a;
 }

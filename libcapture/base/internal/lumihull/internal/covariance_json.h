@@ -3,10 +3,9 @@
 // Covariances in JSON: the upper triangle row by row, N (N + 1) / 2 numbers. What is read is a covariance.
 
 #include <lumihull/internal/json.h>
+#include <lumihull/internal/small_matrices.h>
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
-#include <cmath>
 
 namespace lumihull::internal {
 
@@ -20,16 +19,11 @@ Eigen::Matrix<double, N, N> read_covariance(const JsonReader& json) {
   std::size_t at = 0;
   for (int i = 0; i < N; ++i)
     for (int k = i; k < N; ++k) c(i, k) = c(k, i) = json.at(at++).number(-1e30, 1e30);
-  // Scaled to a unit diagonal, no eigenvalue may be negative.
-  Eigen::Matrix<double, N, 1> unit;
   for (int i = 0; i < N; ++i) {
     if (!(c(i, i) >= 0)) json.fail(numbers + " without negative variances");
     if (!(c(i, i) > 0) && !c.row(i).isZero(0)) json.fail(numbers + " with zeros where the variance is 0");
-    unit(i) = c(i, i) > 0 ? 1 / std::sqrt(c(i, i)) : 0;
   }
-  const Matrix scaled = unit.asDiagonal() * c * unit.asDiagonal();
-  if (!scaled.allFinite() || !(Eigen::SelfAdjointEigenSolver<Matrix>(scaled).eigenvalues()(0) > -1e-6))
-    json.fail(numbers + " without negative eigenvalues");
+  if (!is_covariance(c)) json.fail(numbers + " without negative eigenvalues");
   return c;
 }
 
