@@ -198,7 +198,7 @@ TEST(LightFieldGlb, LeavesOutVerticesThatNobodyUsesAndTheirMaps) {
     const slf::LightField before = field;
     field.base.mesh.vertices.push_back({9, 9, 9});
     if (slots) field.slot.push_back(std::uint8_t(field.terms[0].surface.size()));
-    if (field.reflection) field.reflection->normals.push_back({0, 0, 1});
+    if (field.reflection) field.reflection->normals.push_back({0, 0, 1}), field.reflection->strength.push_back(0);
     for (auto& term : field.terms) {
       if (slots) term.surface.push_back(term.surface[0]);
       std::vector<std::uint8_t> longer;
@@ -249,7 +249,7 @@ TEST(LightFieldGlb, WrongCountsAndSizesAreNamed) {
   in_extension("scale without end", [](json& e) { e["terms"][1]["surfaceScale"]["scale"] = 1e300; });
   expect_refused("no extension", [](json& d) { d["meshes"][0]["primitives"][0].erase("extensions"); });
   Parts newer = parts_of(good);
-  extension_of(newer.document)["version"] = 3;
+  extension_of(newer.document)["version"] = 4;
   write_file(folder / "newer.glb", joined(newer));
   EXPECT_EQ(test::expect_error([&] { slf::read_light_field(folder / "newer.glb"); }).code(), ErrorCode::unsupported);
 }
