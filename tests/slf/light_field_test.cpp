@@ -236,7 +236,8 @@ TEST(LightField, NearLampsAndSeveralMaterialsAreMirrored) {
     if (p.x() < 0.2f || std::abs(p.y()) < 0.2f) continue;  // the lamp's side
     sum[p.y() > 0] += double(r.strength[v]), ++count[p.y() > 0];
   }
-  EXPECT_GT(sum[1] / count[1], 2 * sum[0] / count[0]);
+  // In truth four times; places without a highlight in the photographs are drawn to 1.
+  EXPECT_GT(sum[1] / count[1], 1.6 * sum[0] / count[0]);
 }
 
 TEST(Mirror, RaysMeetTheSphereAroundTheObject) {
