@@ -1,12 +1,15 @@
 #pragma once
 
 #include <lumihull/hull/mesh.h>
+#include <lumihull/slf/light_field.h>
 
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "sphere_grid.h"
@@ -45,6 +48,12 @@ inline Eigen::Vector3f met(const Surroundings& around, const Eigen::Vector3f& po
   return from + (std::sqrt(std::max(0.0f, along * along + 1 - from.squaredNorm())) - along) * ray;
 }
 
+inline MirrorPlace mirror_place(const SphereGrid& grid, const Surroundings& around, const Eigen::Vector3f& point,
+                                const Eigen::Vector3f& normal, const Eigen::Vector3f& eye) {
+  const Eigen::Vector3f to_eye = (eye - point).stableNormalized();
+  return {grid.at(met(around, point, mirrored(to_eye, normal))), grazing(to_eye.dot(normal))};
+}
+
 /// Of a place of a triangle, by its barycentric coordinates; normals: of the mesh's vertices, unit length.
 inline MirrorPlace mirror_place(const SphereGrid& grid, const Surroundings& around, const hull::Mesh& mesh,
                                 const std::vector<Eigen::Vector3f>& normals, std::uint32_t triangle, float b1, float b2,
@@ -53,9 +62,20 @@ inline MirrorPlace mirror_place(const SphereGrid& grid, const Surroundings& arou
   const auto between = [&](const std::vector<Eigen::Vector3f>& of) -> Eigen::Vector3f {
     return (1 - b1 - b2) * of[t[0]] + b1 * of[t[1]] + b2 * of[t[2]];
   };
-  const Eigen::Vector3f point = between(mesh.vertices), to_eye = (eye - point).stableNormalized(),
-                        normal = between(normals).stableNormalized();
-  return {grid.at(met(around, point, mirrored(to_eye, normal))), grazing(to_eye.dot(normal))};
+  return mirror_place(grid, around, between(mesh.vertices), between(normals).stableNormalized(), eye);
+}
+
+/// A stored reflection's values, as mirrored_light() wants them.
+inline std::vector<Eigen::Vector3f> light_of(const LightFieldReflection& r) {
+  std::vector<Eigen::Vector3f> light;
+  for (const auto& [map, scale] : {std::pair(&r.light, r.light_scale), std::pair(&r.grazing, r.grazing_scale)})
+    for (int y = 0; y < map->height(); ++y)
+      for (int x = 0; x < map->width(); ++x) {
+        const std::uint8_t* b = map->row<std::uint8_t>(y) + 3 * x;
+        light.push_back(scale.scale / 255 * Eigen::Vector3f(b[0], b[1], b[2]) +
+                        Eigen::Vector3f::Constant(scale.offset));
+      }
+  return light;
 }
 
 /// What is mirrored there: light holds the values at all nodes, and then, as many, those that come on top of them,

@@ -77,6 +77,7 @@ struct Place {
   Vector2d pixel;
   std::optional<Vector3d> point;
   float height = 0;
+  bool faked = false;  ///< could be, by paint that is misplaced: known, lest others are taken for it, but not asked for
 };
 
 /// What a method's picture shows.
@@ -125,7 +126,7 @@ struct HighlightJudge::Impl {
     for (const BrightSpot& spot : bright_spots(gloss, kLeastHeight, kProminence)) {
       auto point = on_surface(view, spot.pixel);
       if (!point) point = on_surface(view, spot.peak);  // the centroid of a bent one may lie beside the object
-      places.push_back({spot.pixel, point, spot.height});
+      places.push_back({.pixel = spot.pixel, .point = point, .height = spot.height});
     }
     return places;
   }
@@ -187,7 +188,7 @@ std::vector<Track> tracks_of(const std::vector<JudgedView>& views) {
     const auto &here = views[v].places, &there = views[v + 1].places;
     for (std::size_t i = 0; i < here.size(); ++i) {
       const auto next = nearest(there, *here[i].point);
-      if (!next || nearest(here, *there[*next].point) != i) continue;
+      if (!next || nearest(here, *there[*next].point) != i || here[i].faked || there[*next].faked) continue;
       const auto [known, begins] = open.try_emplace(i, tracks.size());
       if (begins) tracks.push_back({v, {i}});
       going_on[*next] = known->second;
@@ -277,8 +278,9 @@ void HighlightJudge::add_view(const View& view, const Image& without, const Imag
     }
   smooth(gloss, smoothing_radius(gloss));
   v.places = impl.places_of(view, gloss);
+  std::erase_if(v.places, [](const Place& p) { return !p.point; });
   const Plane doubt = shaken(v.without);
-  std::erase_if(v.places, [&](const Place& p) { return !p.point || kFound * p.height < largest_near(doubt, p.pixel); });
+  for (Place& p : v.places) p.faked = kFound * p.height < largest_near(doubt, p.pixel);
   impl.views.push_back(std::move(v));
   JudgedView& added = impl.views.back();
   Shown shown = impl.measured(kPhotograph, photograph);

@@ -140,13 +140,7 @@ LightFieldRenderer::LightFieldRenderer(const LightField& field, int terms)
     mirrored_center_ = r.center, mirrored_inverse_radius_ = r.inverse_radius;
     for (const std::uint8_t s : r.strength)
       strength_.push_back(r.strength_scale.scale * float(s) / 255 + r.strength_scale.offset);
-    for (const auto& [map, scale] : {std::pair(&r.light, r.light_scale), {&r.grazing, r.grazing_scale}})
-      for (int y = 0; y < map->height(); ++y)
-        for (int x = 0; x < map->width(); ++x) {
-          const std::uint8_t* b = map->row<std::uint8_t>(y) + 3 * x;
-          mirrored_light_.push_back(scale.scale / 255 * Eigen::Vector3f(b[0], b[1], b[2]) +
-                                    Eigen::Vector3f::Constant(scale.offset));
-        }
+    mirrored_light_ = light_of(r);
   }
   const std::size_t vertices = mesh_.vertices.size();
   view_.resize(vertices * nodes_.size() * terms_);

@@ -8,6 +8,9 @@
 #include <numbers>
 #include <utility>
 
+#include "color.h"
+#include "fit/mirror.h"
+
 namespace lumihull::slf {
 namespace {
 
@@ -19,27 +22,26 @@ constexpr double kShadowOffset = 0.003;  // beside the surface, in diagonals of 
 constexpr double kNearlyUpright = 0.95;  // cosine beyond which a turn about the up axis leaves a direction as it is
 constexpr std::size_t kFewestNodes = 3;
 
-/// What the terms add to vertices' lightness (luma of sRGB values, 0 … 1).
+/// What terms and reflection add to vertices' lightness (luma of sRGB values, 0 … 1).
 class VertexLightness {
  public:
   explicit VertexLightness(const LightField& field) : field_(field) {
     const auto& mesh = field.base.mesh;
     used_.resize(mesh.vertices.size());
     surface_.resize(mesh.vertices.size() * field.terms.size());
+    base_.resize(mesh.vertices.size());
+    if (field.reflection) light_ = light_of(*field.reflection);
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
       for (std::size_t c = 0; c < 3; ++c) {
         const std::uint32_t v = mesh.triangles[t][c];
         if (used_[v]) continue;
         used_[v] = 1;
+        if (field.adds_base) base_[v] = luma_at(field.base.texture, field.base.uv[t][c]);
         for (std::size_t k = 0; k < field.terms.size(); ++k) {
           const LightFieldTerm& term = field.terms[k];
           const Image& map = term.surface[field.slot.empty() ? 0 : field.slot[v]];
-          const Eigen::Vector2f uv = field.base.uv[t][c];
-          const int x = int(std::clamp(uv.x() * float(map.width()), 0.0f, float(map.width() - 1))),
-                    y = int(std::clamp(uv.y() * float(map.height()), 0.0f, float(map.height() - 1)));
-          const std::uint8_t* rgb = map.row<std::uint8_t>(y) + 3 * x;
-          const float luma = (0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2]) / 255;
-          surface_[v * field.terms.size() + k] = term.surface_scale.scale * luma + term.surface_scale.offset;
+          surface_[v * field.terms.size() + k] =
+              term.surface_scale.scale * luma_at(map, field.base.uv[t][c]) + term.surface_scale.offset;
         }
       }
   }
@@ -53,13 +55,30 @@ class VertexLightness {
       const float view = term.view_scale.scale * float(term.view[node * used_.size() + vertex]) / 255;
       sum += surface_[vertex * field_.terms.size() + k] * (view + term.view_scale.offset);
     }
-    return sum;
+    if (!field_.reflection) return sum;
+    const LightFieldReflection& r = *field_.reflection;
+    const SphereGrid grid(r.light.width());
+    const MirrorPlace place = mirror_place(grid, {r.center, r.inverse_radius}, field_.base.mesh.vertices[vertex],
+                                           r.normals[vertex], field_.nodes[node]);
+    const float strength = r.strength_scale.scale / 255 * float(r.strength[vertex]) + r.strength_scale.offset,
+                light = strength * mirrored_light(light_, place).dot(Eigen::Vector3f(0.2126f, 0.7152f, 0.0722f)),
+                lit = linear_from_srgb(std::clamp(base_[vertex] + sum, 0.0f, 1.0f)) + light;
+    return srgb_from_linear(std::clamp(lit, 0.0f, 1.0f)) - base_[vertex];
   }
 
  private:
+  static float luma_at(const Image& map, const Eigen::Vector2f& uv) {
+    const int x = int(std::clamp(uv.x() * float(map.width()), 0.0f, float(map.width() - 1))),
+              y = int(std::clamp(uv.y() * float(map.height()), 0.0f, float(map.height() - 1)));
+    const std::uint8_t* rgb = map.row<std::uint8_t>(y) + 3 * x;
+    return (0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2]) / 255;
+  }
+
   const LightField& field_;
   std::vector<std::uint8_t> used_;
   std::vector<float> surface_;  // vertices x terms
+  std::vector<float> base_;     // of vertices
+  std::vector<Eigen::Vector3f> light_;
 };
 
 double cosine_to(const Eigen::Vector3d& normal, const Eigen::Vector3d& way) {
@@ -83,7 +102,7 @@ std::pair<std::vector<Eigen::Vector3d>, Eigen::Vector3d> turned(const Eigen::Vec
 
 std::vector<View> light_fan(const LightField& field, const hull::RayScene& scene, int count, int side) {
   const hull::Mesh& mesh = field.base.mesh;
-  if (field.terms.empty()) return {};
+  if (field.terms.empty() && !field.reflection) return {};
   const std::vector<Eigen::Vector3f> normals = hull::vertex_normals(mesh);
   const VertexLightness lightness(field);
   Eigen::AlignedBox3d box;
