@@ -238,7 +238,7 @@ TEST(Highlights, PhotographsOfABustFollowThemAndItsMeanColourDoesNot) {
   Job job;
   RigOptions o;
   o.object = "bust";
-  o.photos = 16, o.empty_photos = 1, o.test_views = 6;
+  o.photos = 16, o.empty_photos = 1, o.test_views = 8;
   o.width = 480;
   o.light = test::coarse_light();
   Capture capture = make_capture(folder / "c", o, job);
@@ -268,7 +268,7 @@ TEST(Highlights, PhotographsOfABustFollowThemAndItsMeanColourDoesNot) {
   ASSERT_EQ(paths.count("mean"), 1u);
   const slf::HighlightPath &photograph = paths.at("photograph"), &texture = paths.at("mean");
   EXPECT_GT(photograph.tracks, 8u);
-  EXPECT_GT(photograph.true_length_px, 60);
+  EXPECT_GT(photograph.true_length_px, 100);
   EXPECT_GT(photograph.share, .95);
   EXPECT_LT(photograph.rms_px, 1);
   EXPECT_LT(texture.share, .12) << texture.found << " of " << texture.places;
